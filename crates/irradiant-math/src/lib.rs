@@ -1,0 +1,2 @@
+//! Points, vectors, rays, transforms, warps, distributions and low-discrepancy sequences.
+#![forbid(unsafe_code)]

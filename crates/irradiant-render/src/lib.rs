@@ -1,0 +1,2 @@
+//! What walks the scene: integrators, scheduling and sessions.
+#![forbid(unsafe_code)]

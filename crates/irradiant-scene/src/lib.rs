@@ -1,0 +1,2 @@
+//! The scene description as plain data, spans and diagnostics.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! Wavelengths, sampled and stored spectra, colour spaces, RGB uplifting, sensors and measured data.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! Statistical tests over closures and numbers: chi-square, z-tests, confidence intervals.
+#![forbid(unsafe_code)]
