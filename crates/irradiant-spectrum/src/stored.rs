@@ -1,0 +1,548 @@
+//! Spectra at rest: what a scene stores and a path evaluates, in either basis.
+//!
+//! Evaluation is exact in the form each spectrum was given, and agrees with pbrt-v4's: tables are
+//! interpolated linearly and 0 outside their range; dense tables are read at the nearest nanometre.
+//! Colour comes in by its [`Role`], which decides how RGB becomes a spectrum and how a spectrum
+//! becomes RGB for a render in the RGB basis.
+
+use crate::photometry::{CIE_Y_INTEGRAL, DENSE_LENGTH, xyz_of};
+use crate::uplift::SigmoidPolynomial;
+use crate::{Basis, ColorSpace, LAMBDA_MAX, LAMBDA_MIN, SampledSpectrum, Wavelengths, matrix};
+use std::sync::Arc;
+
+/// What a spectrum is of, which decides its translation to and from RGB.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Reflectance or transmittance in [0, 1]: RGB as seen under the colour space's white, so a constant is grey.
+    Reflectance,
+    /// Emission: RGB of the light itself, so that the colour space's illuminant is (1, 1, 1).
+    Illuminant,
+    /// Non-negative and dimensionless or per length (metals' eta and k, scattering coefficients): translated like a
+    /// reflectance, that is, averaged with the colour space's matching curves under its white, but not bounded by 1.
+    Unbounded,
+}
+
+/// An sRGB-like triple seen as a reflectance: plain data, cheap enough to make at every texture look-up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RgbAlbedo {
+    /// The triple, clamped to [0, 1].
+    pub rgb: [f32; 3],
+    /// Its spectrum.
+    pub polynomial: SigmoidPolynomial,
+}
+
+impl RgbAlbedo {
+    /// The reflectance `rgb` of `space`, clamped to [0, 1].
+    #[inline]
+    pub fn new(rgb: [f32; 3], space: &ColorSpace) -> Self {
+        let rgb = rgb.map(|v| v.max(0.0).min(1.0));
+        Self { rgb, polynomial: space.uplift(rgb) }
+    }
+
+    /// The reflectance at each wavelength, in [0, 1].
+    #[inline]
+    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
+        match wavelengths.basis {
+            Basis::Spectral => self.polynomial.sample(wavelengths),
+            Basis::Rgb => lanes(self.rgb),
+        }
+    }
+}
+
+/// A triple of any non-negative size: `scale` times a reflectance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RgbUnbounded {
+    /// The triple.
+    pub rgb: [f32; 3],
+    /// Twice the largest component, as pbrt-v4.
+    pub scale: f32,
+    /// The spectrum of `rgb / scale`.
+    pub polynomial: SigmoidPolynomial,
+}
+
+impl RgbUnbounded {
+    /// The spectrum of `rgb` of `space`; negative components (and NaN) become 0.
+    #[inline]
+    pub fn new(rgb: [f32; 3], space: &ColorSpace) -> Self {
+        let rgb = rgb.map(|v| v.max(0.0));
+        let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
+        let polynomial = space.uplift(if scale > 0.0 { rgb.map(|v| v / scale) } else { [0.0; 3] });
+        Self { rgb, scale, polynomial }
+    }
+
+    /// The value at each wavelength.
+    #[inline]
+    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
+        match wavelengths.basis {
+            Basis::Spectral => self.polynomial.sample(wavelengths) * self.scale,
+            Basis::Rgb => lanes(self.rgb),
+        }
+    }
+}
+
+/// A triple seen as light: an unbounded colour times the colour space's illuminant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RgbIlluminant {
+    /// The colour without the illuminant.
+    pub color: RgbUnbounded,
+    /// Whose illuminant.
+    pub space: &'static ColorSpace,
+}
+
+impl RgbIlluminant {
+    /// Light that is `rgb` of `space`; (1, 1, 1) is the illuminant, with Y = 1.
+    #[inline]
+    pub fn new(rgb: [f32; 3], space: &'static ColorSpace) -> Self {
+        Self { color: RgbUnbounded::new(rgb, space), space }
+    }
+
+    /// The value at each wavelength, relative spectral radiance.
+    #[inline]
+    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
+        match wavelengths.basis {
+            Basis::Spectral => self.color.sample(wavelengths) * sample_dense(self.space.illuminant(), wavelengths),
+            Basis::Rgb => lanes(self.color.rgb),
+        }
+    }
+}
+
+#[inline]
+fn lanes(rgb: [f32; 3]) -> SampledSpectrum {
+    SampledSpectrum([rgb[0], rgb[1], rgb[2], rgb[1]])
+}
+
+/// The entry nearest to `lambda` nm, halves away from zero; 0 outside 359.5..830.5.
+#[inline]
+pub(crate) fn eval_dense(values: &[f32; DENSE_LENGTH], lambda: f32) -> f32 {
+    let index = lambda - (LAMBDA_MIN - 0.5);
+    // The saturating cast sends NaN and negatives to 0, hence the first condition.
+    let i = index as usize;
+    if index >= 0.0 && i < DENSE_LENGTH { values[i] } else { 0.0 }
+}
+
+/// [`eval_dense`] at each wavelength.
+#[inline]
+pub(crate) fn sample_dense(values: &[f32; DENSE_LENGTH], wavelengths: &Wavelengths) -> SampledSpectrum {
+    SampledSpectrum(wavelengths.lambda.map(|l| eval_dense(values, l)))
+}
+
+/// A table of (wavelength, value), increasing in wavelength, interpolated linearly; 0 outside.
+///
+/// Finding the segment costs one look-up by whole nanometre and rarely a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    lambda: Box<[f32]>,
+    values: Box<[f32]>,
+    /// For each whole nm from 360: the last entry at or below it (0 if none).
+    segment: Box<[u16; DENSE_LENGTH]>,
+}
+
+impl Table {
+    /// From checked columns: equally long, increasing.
+    pub(crate) fn new(lambda: &[f32], values: &[f32]) -> Self {
+        let segment = std::array::from_fn(|i| {
+            let nm = LAMBDA_MIN + i as f32;
+            lambda.partition_point(|&l| l <= nm).saturating_sub(1).min(usize::from(u16::MAX)) as u16
+        });
+        Self { lambda: lambda.into(), values: values.into(), segment: Box::new(segment) }
+    }
+
+    /// The wavelengths, nm.
+    pub fn lambda(&self) -> &[f32] {
+        &self.lambda
+    }
+
+    /// The values at [`Table::lambda`].
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The interpolated value at `lambda` nm.
+    #[inline]
+    pub fn eval(&self, lambda: f32) -> f32 {
+        let (wavelengths, values) = (&*self.lambda, &*self.values);
+        let (Some(&first), Some(&last)) = (wavelengths.first(), wavelengths.last()) else { return 0.0 };
+        if !(first <= lambda && lambda <= last) {
+            return 0.0;
+        }
+        let mut i = if (LAMBDA_MIN..=LAMBDA_MAX).contains(&lambda) {
+            usize::from(self.segment[(lambda - LAMBDA_MIN) as usize])
+        } else {
+            wavelengths.partition_point(|&l| l <= lambda).saturating_sub(1)
+        };
+        while i + 1 < wavelengths.len() && wavelengths[i + 1] <= lambda {
+            i += 1;
+        }
+        if i + 1 >= wavelengths.len() {
+            return values[i];
+        }
+        let t = (lambda - wavelengths[i]) / (wavelengths[i + 1] - wavelengths[i]);
+        (1.0 - t) * values[i] + t * values[i + 1]
+    }
+}
+
+/// A black body, normalised to 1 at its peak, times `scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blackbody {
+    /// K.
+    pub temperature: f32,
+    /// What multiplies the normalised spectrum.
+    pub scale: f32,
+    /// Second radiation constant over temperature, nm.
+    c2_over_t: f32,
+    /// Makes the peak `scale`: (um)^5.
+    factor: f32,
+}
+
+impl Blackbody {
+    fn new(temperature: f32, scale: f32) -> Self {
+        let temperature = temperature.max(0.0);
+        let c2_over_t = 1.438_776_9e7 / f64::from(temperature);
+        // Wien: the peak lies where c2 / (lambda T) = 4.965114.
+        let peak = 2.897_772_1e-3 / f64::from(temperature) * 1e6;
+        let factor = f64::from(scale) * peak.powi(5) * (f64::from(crate::elementary::exp((c2_over_t / (peak * 1e3)) as f32)) - 1.0);
+        if temperature > 0.0 && factor.is_finite() {
+            Self { temperature, scale, c2_over_t: c2_over_t as f32, factor: factor as f32 }
+        } else {
+            Self { temperature, scale, c2_over_t: 0.0, factor: 0.0 }
+        }
+    }
+
+    #[inline]
+    fn eval(&self, lambda: f32) -> f32 {
+        if self.factor == 0.0 {
+            return 0.0;
+        }
+        let um = lambda * 1e-3;
+        let um2 = um * um;
+        self.factor / (um2 * um2 * um * (crate::elementary::exp(self.c2_over_t / lambda) - 1.0))
+    }
+}
+
+/// The forms a spectrum can have. Big tables are shared.
+#[derive(Clone, Debug)]
+pub enum Curve {
+    /// The same at every wavelength.
+    Constant(f32),
+    /// 360..=830 nm at 1 nm, read at the nearest nanometre.
+    Dense(Arc<[f32; DENSE_LENGTH]>),
+    /// Linear between given points.
+    PiecewiseLinear(Arc<Table>),
+    /// Planck's law, normalised to its peak.
+    Blackbody(Blackbody),
+    /// RGB as a reflectance.
+    RgbAlbedo(RgbAlbedo),
+    /// RGB of any size.
+    RgbUnbounded(RgbUnbounded),
+    /// RGB as light.
+    RgbIlluminant(RgbIlluminant),
+}
+
+/// A spectral distribution over wavelength, ready in both bases. Cloning is cheap.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    curve: Curve,
+    role: Role,
+    /// Linear RGB in the space it was built for, or moved to by [`Spectrum::in_space`].
+    rgb: [f32; 3],
+}
+
+/// Why a table is not a spectrum.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SpectrumError {
+    /// No entries.
+    Empty,
+    /// The columns differ in length: (wavelengths, values).
+    LengthMismatch(usize, usize),
+    /// The entry of this index does not have a larger wavelength than the one before it, or is not a number.
+    NotIncreasing(usize),
+    /// The value of this index is infinite or not a number.
+    NotFinite(usize),
+    /// More than 65,535 entries.
+    TooLong(usize),
+}
+
+impl std::fmt::Display for SpectrumError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Empty => write!(f, "the spectrum has no entries"),
+            Self::LengthMismatch(l, v) => write!(f, "{l} wavelengths but {v} values"),
+            Self::NotIncreasing(i) => write!(f, "wavelengths must increase, but entry {i} does not exceed the one before it"),
+            Self::NotFinite(i) => write!(f, "the value of entry {i} is not a finite number"),
+            Self::TooLong(n) => write!(f, "{n} entries; at most 65535 are supported"),
+        }
+    }
+}
+
+impl std::error::Error for SpectrumError {}
+
+impl Spectrum {
+    /// The same `value` at every wavelength.
+    pub fn constant(value: f32, role: Role, space: &'static ColorSpace) -> Self {
+        let rgb = match role {
+            // Exactly grey, without the rounding of an integral.
+            Role::Reflectance | Role::Unbounded => [value; 3],
+            Role::Illuminant => rgb_of(|_| value, role, space),
+        };
+        Self { curve: Curve::Constant(value), role, rgb }
+    }
+
+    /// Values at 360..=830 nm in 1 nm steps, read at the nearest nanometre.
+    pub fn dense(values: &[f32; DENSE_LENGTH], role: Role, space: &'static ColorSpace) -> Self {
+        Self::from_curve(Curve::Dense(Arc::new(*values)), role, space)
+    }
+
+    /// `f` of the wavelength at 360..=830 nm in 1 nm steps, read at the nearest nanometre.
+    pub fn dense_from_fn(f: impl Fn(f32) -> f32, role: Role, space: &'static ColorSpace) -> Self {
+        Self::dense(&std::array::from_fn(|i| f(LAMBDA_MIN + i as f32)), role, space)
+    }
+
+    /// Linear between (`lambda` nm, `values`), 0 outside; an error says which entry is wrong.
+    pub fn piecewise_linear(
+        lambda: &[f32],
+        values: &[f32],
+        role: Role,
+        space: &'static ColorSpace,
+    ) -> Result<Self, SpectrumError> {
+        if lambda.len() != values.len() {
+            return Err(SpectrumError::LengthMismatch(lambda.len(), values.len()));
+        }
+        if lambda.is_empty() {
+            return Err(SpectrumError::Empty);
+        }
+        if lambda.len() > usize::from(u16::MAX) {
+            return Err(SpectrumError::TooLong(lambda.len()));
+        }
+        if !lambda[0].is_finite() {
+            return Err(SpectrumError::NotIncreasing(0));
+        }
+        if let Some(i) = (1..lambda.len()).find(|&i| !(lambda[i - 1] < lambda[i] && lambda[i].is_finite())) {
+            return Err(SpectrumError::NotIncreasing(i));
+        }
+        if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+            return Err(SpectrumError::NotFinite(i));
+        }
+        Ok(Self::from_table(Table::new(lambda, values), role, space))
+    }
+
+    /// From pairs wavelength, value, wavelength, value, … as scene files and `.spd` files list them.
+    pub fn interleaved(pairs: &[f32], role: Role, space: &'static ColorSpace) -> Result<Self, SpectrumError> {
+        let lambda: Vec<f32> = pairs.iter().step_by(2).copied().collect();
+        let values: Vec<f32> = pairs.iter().skip(1).step_by(2).copied().collect();
+        Self::piecewise_linear(&lambda, &values, role, space)
+    }
+
+    /// A black body of `temperature` K, normalised to 1 at its peak (which may lie outside the visible); 0 for 0 K.
+    pub fn blackbody(temperature: f32, role: Role, space: &'static ColorSpace) -> Self {
+        Self::from_curve(Curve::Blackbody(Blackbody::new(temperature, 1.0)), role, space)
+    }
+
+    /// The spectrum that linear `rgb` of `space` stands for in `role`.
+    pub fn rgb(rgb: [f32; 3], role: Role, space: &'static ColorSpace) -> Self {
+        match role {
+            Role::Reflectance => Self::rgb_albedo(rgb, space),
+            Role::Illuminant => Self::rgb_illuminant(rgb, space),
+            Role::Unbounded => Self::rgb_unbounded(rgb, space),
+        }
+    }
+
+    /// RGB as a reflectance; components are clamped to [0, 1].
+    pub fn rgb_albedo(rgb: [f32; 3], space: &'static ColorSpace) -> Self {
+        let s = RgbAlbedo::new(rgb, space);
+        Self { curve: Curve::RgbAlbedo(s), role: Role::Reflectance, rgb: s.rgb }
+    }
+
+    /// RGB of any non-negative size.
+    pub fn rgb_unbounded(rgb: [f32; 3], space: &'static ColorSpace) -> Self {
+        let s = RgbUnbounded::new(rgb, space);
+        Self { curve: Curve::RgbUnbounded(s), role: Role::Unbounded, rgb: s.rgb }
+    }
+
+    /// RGB as light: times the illuminant of `space`.
+    pub fn rgb_illuminant(rgb: [f32; 3], space: &'static ColorSpace) -> Self {
+        let s = RgbIlluminant::new(rgb, space);
+        Self { curve: Curve::RgbIlluminant(s), role: Role::Illuminant, rgb: s.color.rgb }
+    }
+
+    pub(crate) fn from_table(table: Table, role: Role, space: &'static ColorSpace) -> Self {
+        Self::from_curve(Curve::PiecewiseLinear(Arc::new(table)), role, space)
+    }
+
+    fn from_curve(curve: Curve, role: Role, space: &'static ColorSpace) -> Self {
+        let mut s = Self { curve, role, rgb: [0.0; 3] };
+        s.rgb = rgb_of(|l| s.eval(l), role, space);
+        s
+    }
+
+    /// What form it has.
+    pub fn curve(&self) -> &Curve {
+        &self.curve
+    }
+
+    /// What it is of.
+    pub fn role(&self) -> Role {
+        self.role
+    }
+
+    /// Its linear RGB in the space it was built for or moved to; never negative for colours within the gamut,
+    /// and clamped at 0 outside it.
+    pub fn to_rgb(&self) -> [f32; 3] {
+        self.rgb
+    }
+
+    /// The same spectrum whose RGB lanes are of `space`: for a render whose RGB is not the one the author wrote in.
+    pub fn in_space(&self, space: &'static ColorSpace) -> Self {
+        let rgb = match &self.curve {
+            Curve::RgbIlluminant(s) if s.space == space => s.color.rgb,
+            Curve::Constant(c) if self.role != Role::Illuminant => [*c; 3],
+            _ => rgb_of(|l| self.eval(l), self.role, space),
+        };
+        Self { rgb, ..self.clone() }
+    }
+
+    /// The same spectrum in another role, with RGB lanes of `space`.
+    pub fn with_role(&self, role: Role, space: &'static ColorSpace) -> Self {
+        Self { role, ..self.clone() }.in_space(space)
+    }
+
+    /// Every value times `factor`.
+    pub fn scaled(&self, factor: f32) -> Self {
+        let unbounded = |s: &RgbUnbounded| RgbUnbounded { rgb: s.rgb.map(|v| v * factor), scale: s.scale * factor, ..*s };
+        let curve = match &self.curve {
+            Curve::Constant(c) => Curve::Constant(c * factor),
+            Curve::Dense(v) => Curve::Dense(Arc::new(v.map(|v| v * factor))),
+            Curve::PiecewiseLinear(t) => {
+                let values: Vec<f32> = t.values.iter().map(|v| v * factor).collect();
+                Curve::PiecewiseLinear(Arc::new(Table { values: values.into(), ..(**t).clone() }))
+            }
+            Curve::Blackbody(b) => Curve::Blackbody(Blackbody::new(b.temperature, b.scale * factor)),
+            Curve::RgbAlbedo(s) => Curve::RgbUnbounded(RgbUnbounded {
+                rgb: s.rgb.map(|v| v * factor),
+                scale: factor,
+                polynomial: s.polynomial,
+            }),
+            Curve::RgbUnbounded(s) => Curve::RgbUnbounded(unbounded(s)),
+            Curve::RgbIlluminant(s) => Curve::RgbIlluminant(RgbIlluminant { color: unbounded(&s.color), space: s.space }),
+        };
+        Self { curve, role: self.role, rgb: self.rgb.map(|v| v * factor) }
+    }
+
+    /// The same spectrum tabulated at 1 nm: what pbrt-v4's lights do with any emission, and fast.
+    pub fn to_dense(&self) -> Self {
+        let values = std::array::from_fn(|i| self.eval(LAMBDA_MIN + i as f32));
+        Self { curve: Curve::Dense(Arc::new(values)), role: self.role, rgb: self.rgb }
+    }
+
+    /// The value at `lambda` nm.
+    pub fn eval(&self, lambda: f32) -> f32 {
+        match &self.curve {
+            Curve::Constant(c) => *c,
+            Curve::Dense(values) => eval_dense(values, lambda),
+            Curve::PiecewiseLinear(table) => table.eval(lambda),
+            Curve::Blackbody(b) => b.eval(lambda),
+            Curve::RgbAlbedo(s) => s.polynomial.eval(lambda),
+            Curve::RgbUnbounded(s) => s.scale * s.polynomial.eval(lambda),
+            Curve::RgbIlluminant(s) => {
+                s.color.scale * s.color.polynomial.eval(lambda) * eval_dense(s.space.illuminant(), lambda)
+            }
+        }
+    }
+
+    /// The values in the lanes of `wavelengths`: at its wavelengths, or as RGB.
+    #[inline]
+    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
+        if wavelengths.basis == Basis::Rgb {
+            return lanes(self.rgb);
+        }
+        match &self.curve {
+            Curve::Constant(c) => SampledSpectrum::splat(*c),
+            Curve::Dense(values) => sample_dense(values, wavelengths),
+            Curve::PiecewiseLinear(table) => SampledSpectrum(wavelengths.lambda.map(|l| table.eval(l))),
+            Curve::Blackbody(b) => SampledSpectrum(wavelengths.lambda.map(|l| b.eval(l))),
+            Curve::RgbAlbedo(s) => s.polynomial.sample(wavelengths),
+            Curve::RgbUnbounded(s) => s.polynomial.sample(wavelengths) * s.scale,
+            Curve::RgbIlluminant(s) => s.sample(wavelengths),
+        }
+    }
+
+    /// An upper bound of the value over 360..=830 nm, tight for all but RGB illuminants, and of the RGB lanes.
+    pub fn max_value(&self) -> f32 {
+        let spectral = match &self.curve {
+            Curve::Constant(c) => *c,
+            Curve::Dense(values) => largest(&values[..]),
+            Curve::PiecewiseLinear(table) => largest(&table.values),
+            Curve::Blackbody(b) => b.scale,
+            Curve::RgbAlbedo(s) => s.polynomial.max_value(),
+            Curve::RgbUnbounded(s) => s.scale * s.polynomial.max_value(),
+            Curve::RgbIlluminant(s) => s.color.scale * s.color.polynomial.max_value() * largest(s.space.illuminant()),
+        };
+        largest(&self.rgb).max(spectral)
+    }
+
+    /// Whether the spectrum is a constant, and which: so that callers can skip evaluating it.
+    pub fn as_constant(&self) -> Option<f32> {
+        match self.curve {
+            Curve::Constant(c) => Some(c),
+            _ => None,
+        }
+    }
+
+    /// Whether it depends on wavelength at all (a table of equal values covering 360..=830 nm does not).
+    pub fn is_constant(&self) -> bool {
+        match &self.curve {
+            Curve::Constant(_) => true,
+            Curve::Dense(v) => v.iter().all(|x| x == &v[0]),
+            Curve::PiecewiseLinear(t) => {
+                t.values.iter().all(|x| x == &t.values[0]) && t.eval(LAMBDA_MIN) == t.values[0] && t.eval(LAMBDA_MAX) == t.values[0]
+            }
+            Curve::RgbAlbedo(s) => s.polynomial.is_constant(),
+            Curve::RgbUnbounded(s) => s.polynomial.is_constant(),
+            Curve::Blackbody(_) | Curve::RgbIlluminant(_) => false,
+        }
+    }
+}
+
+fn largest(values: &[f32]) -> f32 {
+    values.iter().copied().fold(f32::NEG_INFINITY, f32::max)
+}
+
+/// Linear RGB of a spectrum in `space`, by its role. Negative components (outside the gamut) become 0.
+fn rgb_of(f: impl Fn(f32) -> f32, role: Role, space: &ColorSpace) -> [f32; 3] {
+    let white = space.illuminant();
+    let xyz = xyz_of(|i| {
+        let v = f64::from(f(LAMBDA_MIN + i as f32));
+        match role {
+            Role::Illuminant => v,
+            Role::Reflectance | Role::Unbounded => v * f64::from(white[i]),
+        }
+    });
+    matrix::apply(&space.rgb_from_xyz_exact, xyz).map(|v| v.max(0.0) as f32)
+}
+
+/// The daylight of correlated colour temperature `temperature` K, normalised like pbrt-v4's: a CIE D series
+/// spectrum above 4000 K, below it a black body of unit luminance. 0.01 of the D series' usual scale.
+pub fn daylight(temperature: f32, space: &'static ColorSpace) -> Spectrum {
+    use crate::data::illuminants::{S0, S1, S2};
+    // c2 was revised from 1.4380 to 1.4388 cm K after the D series was named.
+    let cct = f64::from(temperature) * 1.4388 / 1.4380;
+    if cct < 4000.0 {
+        let black = Spectrum::blackbody(cct as f32, Role::Illuminant, space).to_dense();
+        let y = crate::spectrum_to_photometric(&black);
+        return if y > 0.0 { black.scaled(CIE_Y_INTEGRAL / y) } else { black };
+    }
+    // CIE 15:2004, equations 3.3 to 3.5.
+    let x = if cct <= 7000.0 {
+        -4.607e9 / (cct * cct * cct) + 2.9678e6 / (cct * cct) + 0.09911e3 / cct + 0.244_063
+    } else {
+        -2.0064e9 / (cct * cct * cct) + 1.9018e6 / (cct * cct) + 0.24748e3 / cct + 0.23704
+    };
+    let y = -3.0 * x * x + 2.87 * x - 0.275;
+    let m = 0.0241 + 0.2562 * x - 0.7341 * y;
+    let m1 = (-1.3515 - 1.7703 * x + 5.9114 * y) / m;
+    let m2 = (0.03 - 31.4424 * x + 30.0717 * y) / m;
+    let lambda: Vec<f32> = (0..S0.len()).map(|i| 300.0 + 5.0 * i as f32).collect();
+    let values: Vec<f32> = (0..S0.len())
+        .map(|i| ((f64::from(S0[i]) + f64::from(S1[i]) * m1 + f64::from(S2[i]) * m2) * 0.01) as f32)
+        .collect();
+    Spectrum::from_table(Table::new(&lambda, &values), Role::Illuminant, space).to_dense()
+}

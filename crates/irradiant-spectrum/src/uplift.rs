@@ -1,0 +1,359 @@
+//! RGB to smooth spectra: the sigmoid of a quadratic, fitted as pbrt-v4 fits it.
+//!
+//! Jakob and Hanika 2019, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Computer Graphics
+//! Forum 38(2), with the discretisation of pbrt-v4's `rgb2spec_opt`: coefficients on a 64-cubed grid over (largest
+//! component, its value, ratios of the two others), found by Gauss-Newton in CIE Lab under the space's illuminant,
+//! interpolated trilinearly. Agreement with pbrt-v4 needs the same grid, start values and stopping rule, so those are
+//! kept; the Jacobian is analytic where pbrt's is by differences.
+//!
+//! Nothing is shipped and nothing is fitted in advance: a column of 64 fits (one largest component, one pair of
+//! ratios) is computed when a colour first needs it, and kept. It is a pure function of its place in the grid, so
+//! which thread gets there first does not matter.
+
+use crate::data::{cie1931, illuminants};
+use crate::matrix::{self, Matrix};
+use crate::{LAMBDA_MAX, LAMBDA_MIN, SampledSpectrum, Wavelengths};
+use std::sync::OnceLock;
+
+/// `S(c0 l^2 + c1 l + c2)`, l in nm, with the sigmoid `S(x) = 1/2 + x / (2 sqrt(1 + x^2))`: in [0, 1] everywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SigmoidPolynomial {
+    /// c0 (1/nm^2), c1 (1/nm), c2.
+    pub coefficients: [f32; 3],
+}
+
+#[inline]
+fn sigmoid(x: f32) -> f32 {
+    // Beyond 1e9 the sigmoid is 0 or 1 to the last bit; the clamp also tames infinities.
+    let x = x.max(-1e9).min(1e9);
+    0.5 + x / (2.0 * (1.0 + x * x).sqrt())
+}
+
+impl SigmoidPolynomial {
+    /// The value at `lambda` nm.
+    #[inline]
+    pub fn eval(&self, lambda: f32) -> f32 {
+        let [c0, c1, c2] = self.coefficients;
+        sigmoid((c0 * lambda + c1) * lambda + c2)
+    }
+
+    /// The value at each wavelength. For the spectral basis only.
+    #[inline]
+    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
+        SampledSpectrum(wavelengths.lambda.map(|l| self.eval(l)))
+    }
+
+    /// The largest value over 360..=830 nm.
+    pub fn max_value(&self) -> f32 {
+        let [c0, c1, _] = self.coefficients;
+        let ends = self.eval(LAMBDA_MIN).max(self.eval(LAMBDA_MAX));
+        let extremum = -c1 / (2.0 * c0);
+        if (LAMBDA_MIN..=LAMBDA_MAX).contains(&extremum) { ends.max(self.eval(extremum)) } else { ends }
+    }
+
+    /// Whether the value is the same at every wavelength.
+    pub fn is_constant(&self) -> bool {
+        self.coefficients[0] == 0.0 && self.coefficients[1] == 0.0
+    }
+}
+
+/// Grid points along each axis.
+const RESOLUTION: usize = 64;
+
+/// Coefficients for one largest component and one pair of ratios, along the largest component's value.
+type Column = [[f32; 3]; RESOLUTION];
+
+/// The colour spaces for which fits are defined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Gamut {
+    Srgb,
+    DciP3,
+    Rec2020,
+    Aces2065,
+}
+
+/// The coefficient grid of one colour space, filled as needed.
+pub(crate) struct Columns {
+    gamut: Gamut,
+    fit: OnceLock<Box<Fit>>,
+    columns: Box<[OnceLock<Box<Column>>]>,
+    /// Value of the largest component at each grid point.
+    scale: [f32; RESOLUTION],
+}
+
+impl std::fmt::Debug for Columns {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Columns({:?})", self.gamut)
+    }
+}
+
+impl Columns {
+    pub(crate) fn new(gamut: Gamut) -> Self {
+        Self {
+            gamut,
+            fit: OnceLock::new(),
+            columns: (0..3 * RESOLUTION * RESOLUTION).map(|_| OnceLock::new()).collect(),
+            scale: std::array::from_fn(grid_value),
+        }
+    }
+
+    /// The coefficients at grid point (`largest`, `y`, `x`), for all values of the largest component.
+    #[inline]
+    fn column(&self, largest: usize, y: usize, x: usize) -> &Column {
+        self.columns[(largest * RESOLUTION + y) * RESOLUTION + x].get_or_init(|| self.compute(largest, y, x))
+    }
+
+    #[cold]
+    fn compute(&self, largest: usize, y: usize, x: usize) -> Box<Column> {
+        self.fit.get_or_init(|| Box::new(Fit::new(self.gamut))).column(largest, y, x)
+    }
+
+    pub(crate) fn uplift(&self, rgb: [f32; 3]) -> SigmoidPolynomial {
+        let rgb = rgb.map(|v| v.max(0.0).min(1.0));
+        if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+            // Grey: the constant whose sigmoid is v.
+            let v = rgb[0];
+            return SigmoidPolynomial { coefficients: [0.0, 0.0, (v - 0.5) / (v * (1.0 - v)).sqrt()] };
+        }
+        let mut largest = 0;
+        for i in 1..3 {
+            if rgb[i] >= rgb[largest] {
+                largest = i;
+            }
+        }
+        // Place in the grid and weights of the eight neighbours.
+        let z = rgb[largest];
+        let per_unit = (RESOLUTION - 1) as f32 / z;
+        let x = rgb[(largest + 1) % 3] * per_unit;
+        let y = rgb[(largest + 2) % 3] * per_unit;
+        let last = RESOLUTION - 2;
+        let (xi, yi) = ((x as usize).min(last), (y as usize).min(last));
+        let zi = self.scale.partition_point(|&s| s < z).saturating_sub(1).min(last);
+        let (x1, y1) = (x - xi as f32, y - yi as f32);
+        let z1 = (z - self.scale[zi]) / (self.scale[zi + 1] - self.scale[zi]);
+        let (x0, y0, z0) = (1.0 - x1, 1.0 - y1, 1.0 - z1);
+        let c00 = self.column(largest, yi, xi);
+        let c01 = self.column(largest, yi, xi + 1);
+        let c10 = self.column(largest, yi + 1, xi);
+        let c11 = self.column(largest, yi + 1, xi + 1);
+        let coefficients = std::array::from_fn(|j| {
+            let plane = |z: usize| (c00[z][j] * x0 + c01[z][j] * x1) * y0 + (c10[z][j] * x0 + c11[z][j] * x1) * y1;
+            plane(zi) * z0 + plane(zi + 1) * z1
+        });
+        SigmoidPolynomial { coefficients }
+    }
+}
+
+/// The largest component at grid point `i`: finer near 0 and 1.
+fn grid_value(i: usize) -> f32 {
+    let smoothstep = |x: f64| x * x * (3.0 - 2.0 * x);
+    smoothstep(smoothstep(i as f64 / (RESOLUTION - 1) as f64)) as f32
+}
+
+/// Quadrature nodes: Simpson's 3/8 rule on each 5 nm segment.
+const NODES: usize = 94 * 3 + 1;
+
+/// Nodes rounded up to whole lanes; the rest have weight 0.
+const PADDED: usize = NODES.div_ceil(LANES) * LANES;
+
+/// How many nodes are evaluated side by side.
+const LANES: usize = 2;
+
+/// The curves and matrices of one gamut's fit.
+struct Fit {
+    /// Node position from 0 at 360 nm to 1 at 830 nm.
+    t: [f64; PADDED],
+    /// XYZ weights of the nodes, illuminant included.
+    xyz: [[f64; PADDED]; 3],
+    xyz_from_rgb: Matrix,
+    white: [f64; 3],
+}
+
+/// The value of a table of 5 nm samples from 360 nm at `lambda` nm.
+fn at_5_nm(table: impl Fn(usize) -> f64, lambda: f64) -> f64 {
+    let x = (lambda - 360.0) / 5.0;
+    let i = (x as usize).min(93);
+    let w = x - i as f64;
+    (1.0 - w) * table(i) + w * table(i + 1)
+}
+
+impl Fit {
+    fn new(gamut: Gamut) -> Self {
+        // The rounded matrices that pbrt-v4's fit uses; its renderer's own differ in the fifth digit.
+        let (rgb_from_xyz, xyz_from_rgb): (Matrix, Matrix) = match gamut {
+            Gamut::Srgb => (
+                [[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]],
+                [[0.412453, 0.357580, 0.180423], [0.212671, 0.715160, 0.072169], [0.019334, 0.119193, 0.950227]],
+            ),
+            Gamut::DciP3 => (
+                [[2.4931748, -0.93126315, -0.40265882], [-0.82950425, 1.7626965, 0.023625137], [0.035853732, -0.07618918, 0.9570952]],
+                [[0.48663378, 0.26566276, 0.19817366], [0.22900413, 0.69172573, 0.079269454], [0.0, 0.04511256, 1.0437145]],
+            ),
+            Gamut::Rec2020 => (
+                [
+                    [1.7166511880, -0.3556707838, -0.2533662814],
+                    [-0.6666843518, 1.6164812366, 0.0157685458],
+                    [0.0176398574, -0.0427706133, 0.9421031212],
+                ],
+                [
+                    [0.6369580483, 0.1446169036, 0.1688809752],
+                    [0.2627002120, 0.6779980715, 0.0593017165],
+                    [0.0, 0.0280726930, 1.0609850577],
+                ],
+            ),
+            Gamut::Aces2065 => (
+                [[1.0498110175, 0.0, -0.0000974845], [-0.4959030231, 1.3733130458, 0.0982400361], [0.0, 0.0, 0.9912520182]],
+                [[0.9525523959, 0.0, 0.0000936786], [0.3439664498, 0.7281660966, -0.0721325464], [0.0, 0.0, 1.0088251844]],
+            ),
+        };
+        let illuminant = |i: usize| match gamut {
+            Gamut::Aces2065 => f64::from(illuminants::FIT_D60[i]) / 10_536.3,
+            // The D65 table starts at 300 nm.
+            _ => f64::from(illuminants::D65[i + 12]) / 10_566.864_005_283_874,
+        };
+        let curves = [&cie1931::X, &cie1931::Y, &cie1931::Z];
+        let mut fit = Self { t: [0.0; PADDED], xyz: [[0.0; PADDED]; 3], xyz_from_rgb, white: [0.0; 3] };
+        // The fit goes to RGB and back by the rounded pair, which is not quite the identity.
+        let there_and_back = matrix::multiply(&xyz_from_rgb, &rgb_from_xyz);
+        let h = 470.0 / (NODES - 1) as f64;
+        for n in 0..NODES {
+            let lambda = 360.0 + n as f64 * h;
+            let light = at_5_nm(illuminant, lambda);
+            let simpson = if n == 0 || n == NODES - 1 {
+                1.0
+            } else if n % 3 == 0 {
+                2.0
+            } else {
+                3.0
+            };
+            let weighted = curves.map(|c| at_5_nm(|i| f64::from(c[5 * i]), lambda) * light * simpson * 3.0 / 8.0 * h);
+            fit.t[n] = n as f64 / (NODES - 1) as f64;
+            for (k, v) in matrix::apply(&there_and_back, weighted).into_iter().enumerate() {
+                fit.xyz[k][n] = v;
+            }
+            for k in 0..3 {
+                fit.white[k] += weighted[k];
+            }
+        }
+        fit
+    }
+
+    /// The 64 fits along one column, from a fifth of the way up and then down, each starting at its neighbour.
+    fn column(&self, largest: usize, y: usize, x: usize) -> Box<Column> {
+        let ratio = |i: usize| i as f64 / (RESOLUTION - 1) as f64;
+        let mut column = Box::new([[0.0f32; 3]; RESOLUTION]);
+        let start = RESOLUTION / 5;
+        let mut solve = |range: &mut dyn Iterator<Item = usize>| {
+            let mut c = [0.0; 3];
+            for k in range {
+                let z = f64::from(grid_value(k));
+                let mut rgb = [0.0; 3];
+                rgb[largest] = z;
+                rgb[(largest + 1) % 3] = ratio(x) * z;
+                rgb[(largest + 2) % 3] = ratio(y) * z;
+                self.gauss_newton(rgb, &mut c);
+                // From the unit interval to nm.
+                let (from, per) = (360.0, 1.0 / 470.0);
+                let [a, b, d] = c;
+                column[k] = [
+                    (a * per * per) as f32,
+                    (b * per - 2.0 * a * from * per * per) as f32,
+                    (d - b * from * per + a * (from * per) * (from * per)) as f32,
+                ];
+            }
+        };
+        solve(&mut (start..RESOLUTION));
+        solve(&mut (0..=start).rev());
+        column
+    }
+
+    /// Move the coefficients `c` (over the unit interval) to where their colour is `rgb`, in at most 15 steps.
+    fn gauss_newton(&self, rgb: [f64; 3], c: &mut [f64; 3]) {
+        let (target, _) = self.lab(matrix::apply(&self.xyz_from_rgb, rgb));
+        for _ in 0..15 {
+            let (xyz, xyz_by_c) = self.integrate(c);
+            let (lab, lab_by_xyz) = self.lab(xyz);
+            let residual: [f64; 3] = std::array::from_fn(|i| target[i] - lab[i]);
+            let Some(inverse) = matrix::invert(&matrix::multiply(&lab_by_xyz, &xyz_by_c)) else { return };
+            let step = matrix::apply(&inverse, residual);
+            if !step.iter().all(|s| s.is_finite()) {
+                return;
+            }
+            for j in 0..3 {
+                c[j] += step[j];
+            }
+            let most = c[0].max(c[1]).max(c[2]);
+            if most > 200.0 {
+                *c = c.map(|v| v * (200.0 / most));
+            }
+            if residual.iter().map(|r| r * r).sum::<f64>() < 1e-6 {
+                return;
+            }
+        }
+    }
+
+    /// XYZ of the reflectance with coefficients `c`, and its derivative by them.
+    fn integrate(&self, c: &[f64; 3]) -> ([f64; 3], Matrix) {
+        let mut sums = [[0.0f64; LANES]; 3];
+        let mut by_c = [[[0.0f64; LANES]; 3]; 3];
+        for n in (0..PADDED).step_by(LANES) {
+            let (mut value, mut slopes) = ([0.0; LANES], [[0.0; LANES]; 3]);
+            for l in 0..LANES {
+                let t = self.t[n + l];
+                let x = (c[0] * t + c[1]) * t + c[2];
+                let q = 1.0 / (1.0 + x * x).sqrt();
+                let slope = 0.5 * q * q * q;
+                value[l] = 0.5 * x * q + 0.5;
+                slopes[0][l] = slope * t * t;
+                slopes[1][l] = slope * t;
+                slopes[2][l] = slope;
+            }
+            for k in 0..3 {
+                for l in 0..LANES {
+                    let w = self.xyz[k][n + l];
+                    sums[k][l] += w * value[l];
+                    for j in 0..3 {
+                        by_c[k][j][l] += w * slopes[j][l];
+                    }
+                }
+            }
+        }
+        (sums.map(|s| s.iter().sum()), by_c.map(|row| row.map(|s| s.iter().sum())))
+    }
+
+    /// CIE Lab of `xyz` under the fit's white, and its derivative.
+    fn lab(&self, xyz: [f64; 3]) -> ([f64; 3], Matrix) {
+        const DELTA: f64 = 6.0 / 29.0;
+        let mut f = [0.0; 3];
+        let mut slope = [0.0; 3];
+        for k in 0..3 {
+            let t = xyz[k] / self.white[k];
+            if t > DELTA * DELTA * DELTA {
+                f[k] = cube_root(t);
+                slope[k] = f[k] / (3.0 * t) / self.white[k];
+            } else {
+                f[k] = t / (DELTA * DELTA * 3.0) + 4.0 / 29.0;
+                slope[k] = 1.0 / (DELTA * DELTA * 3.0) / self.white[k];
+            }
+        }
+        (
+            [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])],
+            [
+                [0.0, 116.0 * slope[1], 0.0],
+                [500.0 * slope[0], -500.0 * slope[1], 0.0],
+                [0.0, 200.0 * slope[1], -200.0 * slope[2]],
+            ],
+        )
+    }
+}
+
+/// The cube root of a positive normal number, to a few units in the last place, the same on every platform.
+fn cube_root(x: f64) -> f64 {
+    // A third of the exponent gives 5 % (Kahan); three steps of Halley's method cube the error each.
+    let mut r = f64::from_bits(x.to_bits() / 3 + 0x2A9F_7893_782D_A1CE);
+    for _ in 0..3 {
+        let r3 = r * r * r;
+        r *= (r3 + 2.0 * x) / (2.0 * r3 + x);
+    }
+    r
+}
