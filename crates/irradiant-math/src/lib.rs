@@ -6,7 +6,9 @@
 #![forbid(unsafe_code)]
 
 pub mod bounds;
+pub mod elementary;
 pub mod frame;
+pub mod hash;
 pub mod ray;
 pub mod transform;
 pub mod vector;
