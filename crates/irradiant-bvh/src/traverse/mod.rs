@@ -9,6 +9,9 @@ mod boxes;
 mod scalar;
 mod walk;
 
+#[cfg(test)]
+mod tests;
+
 use crate::level::Level;
 use crate::node::Bvh;
 use crate::ray::{Closest, Leaves, Ray};
