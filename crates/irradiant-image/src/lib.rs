@@ -12,6 +12,7 @@
 //! - [`format`](mod@format): [`read`], [`write`](fn@write) and one module for each file format.
 //! - [`atomic`]: [`atomic_write`], all of a file or none of it.
 //! - [`resize`]: box and Lanczos resampling.
+//! - [`wrap`]: what lies outside a picture; nearest and bilinear lookups.
 //! - [`mip`]: [`MipMap`], filtered texture lookups as pbrt-v4 makes them.
 //! - [`metrics`]: MSE, relMSE, MAPE, PSNR, worst tile.
 //! - [`flip`]: the FLIP difference, for displays and for high dynamic range.
@@ -19,13 +20,14 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic;
+pub mod wrap;
 pub mod encoding;
 pub mod error;
 pub mod format;
 pub mod image;
 pub mod metadata;
-//pub mod resize;
-//pub mod mip;
+pub mod resize;
+pub mod mip;
 //pub mod metrics;
 //pub mod flip;
 //pub mod tone;
@@ -44,6 +46,6 @@ pub use format::{FileFormat, ReadOptions, read, read_file, write};
 pub use image::{Image, PixelFormat, Pixels};
 pub use metadata::{Attribute, Chromaticities, Metadata};
 //pub use metrics::{Comparison, compare};
-//pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
-//pub use resize::ResizeFilter;
+pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
+pub use resize::ResizeFilter;
 //pub use tone::{ToneCurve, ToneOptions, to_srgb8};
