@@ -6,12 +6,15 @@
 #![forbid(unsafe_code)]
 
 pub mod bounds;
+pub mod distribution;
 pub mod elementary;
 pub mod frame;
 pub mod hash;
 pub mod ray;
+pub mod solve;
 pub mod transform;
 pub mod vector;
+pub mod warp;
 
 pub use bounds::{Bounds2, Bounds3};
 pub use frame::Frame;
