@@ -19,13 +19,13 @@
 
 #![forbid(unsafe_code)]
 
-pub mod sampled;
-pub mod wavelengths;
-pub mod stored;
-pub mod photometry;
 pub mod colorspace;
-pub mod uplift;
+pub mod photometry;
+pub mod sampled;
 pub mod sensor;
+pub mod stored;
+pub mod uplift;
+pub mod wavelengths;
 
 mod data;
 mod elementary;
