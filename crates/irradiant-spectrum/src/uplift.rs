@@ -165,6 +165,8 @@ struct Fit {
     t: [f64; PADDED],
     /// XYZ weights of the nodes, illuminant included.
     xyz: [[f64; PADDED]; 3],
+    /// Those times t^2, t and 1.
+    xyz_moments: [[[f64; PADDED]; 3]; 3],
     xyz_from_rgb: Matrix,
     white: [f64; 3],
 }
@@ -228,7 +230,13 @@ impl Fit {
             _ => f64::from(illuminants::D65[i + 12]) / 10_566.864_005_283_874,
         };
         let curves = [&cie1931::X, &cie1931::Y, &cie1931::Z];
-        let mut fit = Self { t: [0.0; PADDED], xyz: [[0.0; PADDED]; 3], xyz_from_rgb, white: [0.0; 3] };
+        let mut fit = Self {
+            t: [0.0; PADDED],
+            xyz: [[0.0; PADDED]; 3],
+            xyz_moments: [[[0.0; PADDED]; 3]; 3],
+            xyz_from_rgb,
+            white: [0.0; 3],
+        };
         // The fit goes to RGB and back by the rounded pair, which is not quite the identity.
         let there_and_back = matrix::multiply(&xyz_from_rgb, &rgb_from_xyz);
         let h = 470.0 / (NODES - 1) as f64;
@@ -245,7 +253,11 @@ impl Fit {
             let weighted = curves.map(|c| at_5_nm(|i| f64::from(c[5 * i]), lambda) * light * simpson * 3.0 / 8.0 * h);
             fit.t[n] = n as f64 / (NODES - 1) as f64;
             for (k, v) in matrix::apply(&there_and_back, weighted).into_iter().enumerate() {
+                let t = fit.t[n];
                 fit.xyz[k][n] = v;
+                for (moment, power) in fit.xyz_moments[k].iter_mut().zip([t * t, t, 1.0]) {
+                    moment[n] = v * power;
+                }
             }
             for k in 0..3 {
                 fit.white[k] += weighted[k];
@@ -310,26 +322,25 @@ impl Fit {
 
     /// XYZ of the reflectance with coefficients `c`, and its derivative by them.
     fn integrate(&self, c: &[f64; 3]) -> ([f64; 3], Matrix) {
+        // First the reflectance and its slope at every node, then twelve dot products with tables: a quarter faster than
+        // one loop, whose sums do not fit the registers.
+        let mut value = [0.0f64; PADDED];
+        let mut slope = [0.0f64; PADDED];
+        for n in 0..PADDED {
+            let t = self.t[n];
+            let x = (c[0] * t + c[1]) * t + c[2];
+            let q = 1.0 / (1.0 + x * x).sqrt();
+            value[n] = 0.5 * x * q + 0.5;
+            slope[n] = 0.5 * q * q * q;
+        }
         let mut sums = [[0.0f64; LANES]; 3];
         let mut by_c = [[[0.0f64; LANES]; 3]; 3];
         for n in (0..PADDED).step_by(LANES) {
-            let (mut value, mut slopes) = ([0.0; LANES], [[0.0; LANES]; 3]);
-            for l in 0..LANES {
-                let t = self.t[n + l];
-                let x = (c[0] * t + c[1]) * t + c[2];
-                let q = 1.0 / (1.0 + x * x).sqrt();
-                let slope = 0.5 * q * q * q;
-                value[l] = 0.5 * x * q + 0.5;
-                slopes[0][l] = slope * t * t;
-                slopes[1][l] = slope * t;
-                slopes[2][l] = slope;
-            }
             for k in 0..3 {
                 for l in 0..LANES {
-                    let w = self.xyz[k][n + l];
-                    sums[k][l] += w * value[l];
+                    sums[k][l] += self.xyz[k][n + l] * value[n + l];
                     for j in 0..3 {
-                        by_c[k][j][l] += w * slopes[j][l];
+                        by_c[k][j][l] += self.xyz_moments[k][j][n + l] * slope[n + l];
                     }
                 }
             }
