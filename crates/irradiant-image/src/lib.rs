@@ -20,22 +20,22 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic;
-pub mod wrap;
 pub mod encoding;
 pub mod error;
+pub mod flip;
 pub mod format;
 pub mod image;
 pub mod metadata;
-pub mod resize;
+pub mod metrics;
 pub mod mip;
-//pub mod metrics;
-//pub mod flip;
-//pub mod tone;
+pub mod resize;
+pub mod tone;
+pub mod wrap;
 
 pub use atomic::atomic_write;
 pub use encoding::Encoding;
 pub use error::ImageError;
-//pub use flip::{FlipOptions, flip_hdr, flip_ldr};
+pub use flip::{Flip, FlipOptions, flip_hdr, flip_ldr};
 pub use format::exr_write::{Compression, write_exr};
 pub use format::hdr::write_hdr;
 pub use format::jpeg::write_jpeg;
@@ -45,7 +45,7 @@ pub use format::qoi::write_qoi;
 pub use format::{FileFormat, ReadOptions, read, read_file, write};
 pub use image::{Image, PixelFormat, Pixels};
 pub use metadata::{Attribute, Chromaticities, Metadata};
-//pub use metrics::{Comparison, compare};
+pub use metrics::{CompareError, Comparison, WorstTile, compare};
 pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
 pub use resize::ResizeFilter;
-//pub use tone::{ToneCurve, ToneOptions, to_srgb8};
+pub use tone::{ToneCurve, ToneOptions, false_colour, to_srgb8, tone_map};

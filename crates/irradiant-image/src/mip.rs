@@ -448,7 +448,9 @@ fn halve(samples: &[f32], width: usize, height: usize, channels: usize) -> Vec<f
         for x in 0..new_width {
             let base = (2 * y * width + 2 * x) * channels;
             for channel in base..base + channels {
-                let sum = samples[channel] + samples[channel + right] + samples[channel + below]
+                let sum = samples[channel]
+                    + samples[channel + right]
+                    + samples[channel + below]
                     + samples[channel + right + below];
                 coarse.push(0.25 * sum);
             }
@@ -511,7 +513,8 @@ mod tests {
             for level in 0..map.levels() {
                 let (w, h) = map.level_size(level);
                 for channel in 0..3 {
-                    let texels = (0..w * h).map(|i| f64::from(map.texel(level, (i % w) as i32, (i / w) as i32, channel)));
+                    let texels =
+                        (0..w * h).map(|i| f64::from(map.texel(level, (i % w) as i32, (i / w) as i32, channel)));
                     assert!((texels.sum::<f64>() / (w * h) as f64 - mean[channel]).abs() < 1e-6);
                 }
             }
@@ -642,7 +645,12 @@ mod tests {
                     }
                 }
                 // A texel may fall on the other side of a bucket's border: 1.8 % of its weight.
-                assert!((f64::from(found[0]) - sum / weights).abs() < 2e-3, "{step} {level}: {} {}", found[0], sum / weights);
+                assert!(
+                    (f64::from(found[0]) - sum / weights).abs() < 2e-3,
+                    "{step} {level}: {} {}",
+                    found[0],
+                    sum / weights
+                );
             }
         }
     }
@@ -661,7 +669,10 @@ mod tests {
     #[test]
     fn scalars_are_means_or_alpha() {
         let rgb = Image::from_fn(2, 2, ["R", "G", "B"], |_, _| [0.3, 0.6, 0.0]);
-        assert!((map(&rgb, MipFilter::Bilinear, WrapMode::Repeat).filter_f32([0.3; 2], [0.0; 2], [0.0; 2]) - 0.3).abs() < 1e-7);
+        assert!(
+            (map(&rgb, MipFilter::Bilinear, WrapMode::Repeat).filter_f32([0.3; 2], [0.0; 2], [0.0; 2]) - 0.3).abs()
+                < 1e-7
+        );
         let rgba = Image::from_fn(2, 2, ["R", "G", "B", "A"], |x, _| [0.1, 0.2, 0.3, x as f32]);
         let alpha = map(&rgba, MipFilter::Bilinear, WrapMode::Clamp);
         assert!(alpha.has_alpha());
