@@ -210,7 +210,7 @@ mod tests {
         }
     }
 
-    // The 24 patches seen by the camera and by the observer, in linear RGB of white 1: a mistyped digit of a response shows.
+    // The 24 patches seen by the camera and by the observer, in linear RGB of white 1: the mean difference of all is 0.005 to 0.0073.
     #[test]
     fn cameras_see_the_chart_nearly_as_the_observer_does() {
         let space = ColorSpace::srgb();
@@ -235,7 +235,7 @@ mod tests {
                     mean += apart / 72.0;
                 }
             }
-            assert!(mean < 0.02, "{name}: {mean}");
+            assert!(mean < 0.008, "{name}: {mean}");
         }
     }
 

@@ -691,6 +691,21 @@ mod tests {
         }
     }
 
+    // Other scales give the same colour by another spectrum, and pictures that differ from pbrt-v4's after a bounce.
+    #[test]
+    fn unbounded_colors_are_uplifted_at_half_their_size() {
+        let half = srgb().uplift([0.2, 0.5, 0.1]);
+        let (unbounded, light) =
+            (Spectrum::rgb_unbounded([2.0, 5.0, 1.0], srgb()), Spectrum::rgb_illuminant([2.0, 5.0, 1.0], srgb()));
+        for l in [400.0, 500.0, 600.0, 700.0] {
+            assert!((unbounded.eval(l) - 10.0 * half.eval(l)).abs() < 1e-5);
+            let d65 = eval_dense(srgb().illuminant(), l);
+            assert!((light.eval(l) - 10.0 * half.eval(l) * d65).abs() < 1e-5);
+        }
+        let black = Spectrum::rgb_illuminant([0.0; 3], srgb());
+        assert_eq!((black.eval(500.0), black.max_value()), (0.0, 0.0));
+    }
+
     #[test]
     fn a_reflectance_keeps_its_look_in_another_space() {
         let s = Spectrum::rgb_albedo([0.7, 0.3, 0.2], srgb());

@@ -190,6 +190,22 @@ mod tests {
         assert_eq!(all.iter().collect::<std::collections::BTreeSet<_>>().len(), all.len(), "a name twice");
     }
 
+    // The responses are typed by hand: a digit lost or doubled makes a step of 2.3 in the logarithm.
+    #[test]
+    fn camera_responses_are_smooth() {
+        for (name, camera) in &sensors::CAMERAS {
+            assert_eq!(camera[1].iter().max(), Some(&100_000), "{name}");
+            for (curve, channel) in camera.iter().zip(SUFFIXES) {
+                // 430 to 690 nm; the ultraviolet edge is steep.
+                for i in 5..32 {
+                    let [before, at, after] = [curve[i - 1], curve[i], curve[i + 1]].map(|v| f64::from(v).ln());
+                    let kink = (at - (before + after) / 2.0).abs();
+                    assert!(kink < 0.85, "{name}{channel} at {} nm: {kink}", 380 + 10 * i);
+                }
+            }
+        }
+    }
+
     #[test]
     fn published_figures_are_reproduced() {
         // Schott's catalogue index at the d line, 587.6 nm; interpolation errs by some 1e-5.
