@@ -11,6 +11,7 @@ pub mod elementary;
 pub mod frame;
 pub mod hash;
 pub mod ray;
+pub mod sequence;
 pub mod solve;
 pub mod transform;
 pub mod vector;
