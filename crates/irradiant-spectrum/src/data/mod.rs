@@ -11,7 +11,8 @@ pub(crate) mod swatches;
 
 use crate::ColorSpace;
 use crate::photometry::{CIE_Y_INTEGRAL, DENSE_LENGTH};
-use crate::stored::{Role, Spectrum, Table};
+use crate::stored::{Role, Spectrum};
+use crate::table::Table;
 use std::sync::{Arc, LazyLock};
 
 /// One named table and how to read it.
