@@ -1,2 +1,49 @@
 //! Pixels in memory and on disk: formats, MIP levels, error metrics.
+//!
+//! Knows nothing of scenes, spectra or files beyond bytes in and bytes out; the only functions
+//! that touch a disk are [`read_file`] and [`atomic_write`].
+//!
+//! # Layout
+//!
+//! - [`image`](mod@image): [`Image`], a rectangle of pixels with named channels, kept in 8 bits, half or float.
+//! - [`encoding`]: sRGB, gamma and linear transfer functions and their 8-bit tables.
+//! - [`metadata`]: what a file said beside its pixels: windows, chromaticities, attributes.
+//! - [`error`]: [`ImageError`], what can be wrong with a file.
+//! - [`format`](mod@format): [`read`], [`write`](fn@write) and one module for each file format.
+//! - [`atomic`]: [`atomic_write`], all of a file or none of it.
+//! - [`resize`]: box and Lanczos resampling.
+//! - [`mip`]: [`MipMap`], filtered texture lookups as pbrt-v4 makes them.
+//! - [`metrics`]: MSE, relMSE, MAPE, PSNR, worst tile.
+//! - [`flip`]: the FLIP difference, for displays and for high dynamic range.
+//! - [`tone`]: exposure, filmic curves, sRGB bytes, false colour.
 #![forbid(unsafe_code)]
+
+pub mod atomic;
+pub mod encoding;
+pub mod error;
+pub mod format;
+pub mod image;
+pub mod metadata;
+//pub mod resize;
+//pub mod mip;
+//pub mod metrics;
+//pub mod flip;
+//pub mod tone;
+
+pub use atomic::atomic_write;
+pub use encoding::Encoding;
+pub use error::ImageError;
+//pub use flip::{FlipOptions, flip_hdr, flip_ldr};
+pub use format::exr_write::{Compression, write_exr};
+pub use format::hdr::write_hdr;
+pub use format::jpeg::write_jpeg;
+pub use format::pfm::write_pfm;
+pub use format::png::{PngDepth, write_png};
+pub use format::qoi::write_qoi;
+pub use format::{FileFormat, ReadOptions, read, read_file, write};
+pub use image::{Image, PixelFormat, Pixels};
+pub use metadata::{Attribute, Chromaticities, Metadata};
+//pub use metrics::{Comparison, compare};
+//pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
+//pub use resize::ResizeFilter;
+//pub use tone::{ToneCurve, ToneOptions, to_srgb8};
