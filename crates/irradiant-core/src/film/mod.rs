@@ -239,8 +239,10 @@ impl FilmTile {
         }
     }
 
-    /// All zero again, storage kept.
-    pub fn clear(&mut self) {
+    /// All zero again, for other pixels of the same number; storage kept.
+    pub fn restart(&mut self, bounds: PixelBounds) {
+        debug_assert_eq!(bounds.area(), self.bounds.area());
+        self.bounds = bounds;
         self.pixels.fill(Pixel::default());
         self.layers.fill(ExactSum::default());
     }
