@@ -1,2 +1,38 @@
-//! Bounding volume hierarchies: build and traverse, scalar specification and SIMD kernels.
+//! Bounding volume hierarchies: what a ray meets first, and whether it meets anything.
+//!
+//! One structure, [`Bvh`], holds two kinds of primitive in one tree: **triangles**, copied into blocks of four and
+//! tested here with a watertight test, and **user primitives**, known only by their boxes and tested by the caller
+//! through [`Leaves`]. Curves, quadrics and instances are user primitives; an instance's callback transforms the ray
+//! and asks another `Bvh`.
+//!
+//! The same hit (primitive and every bit of `t`, `u`, `v`) comes back at every SIMD [`Level`] and from a tree built by
+//! any number of threads: box tests and triangle tests use the same unfused IEEE operations in the same order
+//! everywhere, and ties are broken by primitive index.
+//!
+//! # Layout
+//! - [`ray`](Ray): what goes in and comes out, and the trait the caller implements.
+//! - `level`: which instructions may be used.
+//! - `build`: primitives, binned SAH, the collapse to eight children.
+//! - `node`: the tree in memory; `validate`: its invariants.
+//! - `triangle`: the watertight test, scalar and four at a time.
+//! - `traverse`: the walk, once for closest hits and once for any hit.
+//! - `lanes`: four floats.
+//!
+//! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);
+//! Wald 2007 (binned SAH); Woop, Benthin, Wald 2013 (watertight triangles); Ize 2013 (conservative boxes);
+//! Pharr, Jakob, Humphreys 2023, section 6.8.4 (error bounds of a triangle's `t`).
 #![deny(unsafe_code)]
+
+mod build;
+mod lanes;
+mod level;
+mod node;
+mod ray;
+mod traverse;
+mod triangle;
+mod validate;
+
+pub use build::{BuildInput, BuildReport, BuildSettings, Mesh};
+pub use level::Level;
+pub use node::Bvh;
+pub use ray::{Closest, Hit, Leaves, Ray, TrianglesOnly};

@@ -12,6 +12,7 @@
 //! - [`format`](mod@format): [`read`], [`write`](fn@write) and one module for each file format.
 //! - [`atomic`]: [`atomic_write`], all of a file or none of it.
 //! - [`resize`]: box and Lanczos resampling.
+//! - [`wrap`]: what lies outside a picture; nearest and bilinear lookups.
 //! - [`mip`]: [`MipMap`], filtered texture lookups as pbrt-v4 makes them.
 //! - [`metrics`]: MSE, relMSE, MAPE, PSNR, worst tile.
 //! - [`flip`]: the FLIP difference, for displays and for high dynamic range.
@@ -21,19 +22,20 @@
 pub mod atomic;
 pub mod encoding;
 pub mod error;
+pub mod flip;
 pub mod format;
 pub mod image;
 pub mod metadata;
-//pub mod resize;
-//pub mod mip;
-//pub mod metrics;
-//pub mod flip;
-//pub mod tone;
+pub mod metrics;
+pub mod mip;
+pub mod resize;
+pub mod tone;
+pub mod wrap;
 
 pub use atomic::atomic_write;
 pub use encoding::Encoding;
 pub use error::ImageError;
-//pub use flip::{FlipOptions, flip_hdr, flip_ldr};
+pub use flip::{Flip, FlipOptions, flip_hdr, flip_ldr};
 pub use format::exr_write::{Compression, write_exr};
 pub use format::hdr::write_hdr;
 pub use format::jpeg::write_jpeg;
@@ -43,7 +45,7 @@ pub use format::qoi::write_qoi;
 pub use format::{FileFormat, ReadOptions, read, read_file, write};
 pub use image::{Image, PixelFormat, Pixels};
 pub use metadata::{Attribute, Chromaticities, Metadata};
-//pub use metrics::{Comparison, compare};
-//pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
-//pub use resize::ResizeFilter;
-//pub use tone::{ToneCurve, ToneOptions, to_srgb8};
+pub use metrics::{CompareError, Comparison, WorstTile, compare};
+pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
+pub use resize::ResizeFilter;
+pub use tone::{ToneCurve, ToneOptions, false_colour, to_srgb8, tone_map};

@@ -39,6 +39,11 @@ pub trait Assets: Sync {
     /// The path that a name in a scene means; relative names are relative to the
     /// scene's main file, as in pbrt-v4.
     fn resolve(&self, name: &str) -> PathBuf;
+
+    /// True when there is a file to read; cheaper than reading it where the place allows.
+    fn exists(&self, path: &Path) -> bool {
+        self.read(path).is_ok()
+    }
 }
 
 /// Assets in memory, for tests and for scenes that a program builds.

@@ -89,7 +89,7 @@ pub enum LightKind {
     },
 }
 
-/// The four corners of a portal, in world space after the current transform.
+/// The four corners of a portal, in world space: the current transform is not applied, as in pbrt-v4.
 pub type PortalDesc = [[f32; 3]; 4];
 
 /// Emission of a shape's surface.

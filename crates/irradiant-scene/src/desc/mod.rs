@@ -18,7 +18,7 @@ pub use material::{MaterialDesc, MaterialKind, RoughnessDesc};
 pub use settings::{
     IntegratorDesc, IntegratorKind, LightSamplerKind, OptionsDesc, RenderSpace, SamplerDesc, SamplerKind,
 };
-pub use shape::{MeshData, ShapeDesc, ShapeKind};
+pub use shape::{CurveData, CurveStyle, MeshData, ShapeDesc, ShapeKind};
 pub use texture::{FloatTextureKind, ImageMapDesc, MappingDesc, SpectrumTextureKind, TextureDesc};
 
 use crate::span::{Span, Spanned};
@@ -81,7 +81,8 @@ pub struct SceneDesc {
 pub struct ObjectDesc {
     /// Its name.
     pub name: String,
-    /// Its shapes; their transforms take them to the object's own space, which is where `ObjectBegin` stood.
+    /// Its shapes; their transforms are the whole current transform where each was said (that of `ObjectBegin`
+    /// included), and that is the object's own space: an instance's transform comes on top, as in pbrt-v4.
     pub shapes: Vec<ShapeDesc>,
     /// Where it was begun.
     pub span: Span,

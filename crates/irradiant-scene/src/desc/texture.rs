@@ -85,7 +85,7 @@ pub enum ImageWrap {
 /// How stored numbers stand for linear ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EncodingDesc {
-    /// sRGB for 8-bit images, linear for others.
+    /// Not stated: sRGB for PNG (8 and 16 bits) and other 8-bit formats, linear for floating-point ones.
     Default,
     /// As stored.
     Linear,

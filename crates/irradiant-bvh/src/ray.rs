@@ -1,0 +1,106 @@
+//! What a query takes and gives back, and what the caller supplies for primitives that are not triangles.
+
+/// A ray `o + t d` for `t` in the open interval (0, `t_max`).
+///
+/// `d` need not be of unit length: `t` counts lengths of `d`. A ray with a NaN or infinite `o` or `d`, a zero `d`,
+/// or a `t_max` that is NaN or not positive meets nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Origin, in the space of the tree.
+    pub o: [f32; 3],
+    /// Exclusive end of the ray, in lengths of `d`; may be infinite.
+    pub t_max: f32,
+    /// Direction, any length whose reciprocal is a finite `f32`.
+    pub d: [f32; 3],
+    /// Time, handed to user primitives untouched.
+    pub time: f32,
+}
+
+/// Where a ray meets a triangle.
+///
+/// With vertices `p0, p1, p2` as given in the index triple, the point is `(1 - u - v) p0 + u p1 + v p2`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance in lengths of the ray's `d`; greater than its own rounding error.
+    pub t: f32,
+    /// Barycentric weight of vertex 1.
+    pub u: f32,
+    /// Barycentric weight of vertex 2.
+    pub v: f32,
+    /// Index of the triangle, counted over all meshes of the build list in order.
+    pub primitive: u32,
+}
+
+/// The closest thing a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Closest<U> {
+    /// A triangle.
+    Triangle(Hit),
+    /// A user primitive.
+    User {
+        /// Distance in lengths of the ray's `d`, as the callback returned it.
+        t: f32,
+        /// Index into [`BuildInput::user_boxes`](crate::BuildInput::user_boxes).
+        user: u32,
+        /// What the callback returned.
+        hit: U,
+    },
+}
+
+impl<U> Closest<U> {
+    /// Distance along the ray, in lengths of its `d`.
+    #[inline]
+    pub fn t(&self) -> f32 {
+        match self {
+            Self::Triangle(hit) => hit.t,
+            Self::User { t, .. } => *t,
+        }
+    }
+}
+
+/// What the caller knows about its primitives: how to test user primitives, and which triangle hits count.
+///
+/// Every method must be a pure function of its arguments, or results will depend on the order of traversal.
+pub trait Leaves {
+    /// Whatever the caller wants back for a user primitive.
+    type UserHit: Copy;
+
+    /// Whether [`accept`](Self::accept) is asked about flagged triangles; if `false` the question is compiled out.
+    const HAS_FILTER: bool = false;
+
+    /// The first hit of user primitive `user` with `0 < t < ray.t_max`.
+    ///
+    /// `ray.t_max` is one step above the closest `t` so far, so that equal distances are reported and the tie can be
+    /// broken by index.
+    fn intersect(&self, user: u32, ray: &Ray) -> Option<(f32, Self::UserHit)>;
+
+    /// Whether user primitive `user` has any hit with `0 < t < ray.t_max`.
+    fn occluded(&self, user: u32, ray: &Ray) -> bool;
+
+    /// Whether a hit of a triangle of a mesh flagged [`filtered`](crate::Mesh::filtered) counts (alpha cut-outs).
+    ///
+    /// Called for each candidate in any order, perhaps twice for the same one.
+    #[inline]
+    fn accept(&self, triangle: u32, ray: &Ray, t: f32, u: f32, v: f32) -> bool {
+        let _ = (triangle, ray, t, u, v);
+        true
+    }
+}
+
+/// Leaves of a tree without user primitives or filter.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TrianglesOnly;
+
+impl Leaves for TrianglesOnly {
+    type UserHit = ();
+
+    #[inline]
+    fn intersect(&self, _user: u32, _ray: &Ray) -> Option<(f32, ())> {
+        None
+    }
+
+    #[inline]
+    fn occluded(&self, _user: u32, _ray: &Ray) -> bool {
+        false
+    }
+}

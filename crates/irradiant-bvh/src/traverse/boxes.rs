@@ -1,0 +1,168 @@
+//! Eight boxes at once.
+
+use super::PADDING;
+use crate::lanes::Four;
+use crate::node::{Node, WIDTH};
+use crate::ray::Ray;
+
+/// Entry distances, aligned for whole-register stores.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+pub(crate) struct Near(pub [f32; WIDTH]);
+
+/// A ray prepared for testing boxes.
+pub(crate) trait BoxTest: Copy {
+    /// Lanes for triangles.
+    type Four: Four;
+    fn new(ray: &Ray) -> Self;
+    /// Bit `i` says that the ray enters child `i` before `far`; then `near[i]` says where.
+    fn enter(&self, node: &Node, far: f32) -> (u32, Near);
+}
+
+/// Reciprocals of the direction, and for each axis the index of the plane that the ray meets first.
+#[inline(always)]
+fn reciprocal(ray: &Ray) -> ([f32; 3], [usize; 3]) {
+    let inverse = ray.d.map(|d| 1.0 / d);
+    let side = |a: usize| 2 * a + (inverse[a].to_bits() >> 31) as usize;
+    (inverse, [side(0), side(1), side(2)])
+}
+
+/// Two halves of four.
+#[derive(Clone, Copy)]
+pub(crate) struct Halves<F> {
+    origin: [F; 3],
+    inverse: [F; 3],
+    first: [usize; 3],
+}
+
+impl<F: Four> BoxTest for Halves<F> {
+    type Four = F;
+
+    #[inline(always)]
+    fn new(ray: &Ray) -> Self {
+        let (inverse, first) = reciprocal(ray);
+        Self { origin: ray.o.map(F::splat), inverse: inverse.map(F::splat), first }
+    }
+
+    #[inline(always)]
+    fn enter(&self, node: &Node, far: f32) -> (u32, Near) {
+        let half = |h: usize| {
+            let plane = |p: usize| {
+                let (halves, _) = node.planes[p].as_chunks::<4>();
+                F::load(&halves[h])
+            };
+            let (mut near, mut far) = (F::splat(0.0), F::splat(far));
+            for axis in 0..3 {
+                let p = self.first[axis];
+                near = ((plane(p) - self.origin[axis]) * self.inverse[axis]).max(near);
+                far = ((plane(p ^ 1) - self.origin[axis]) * self.inverse[axis]).min(far);
+            }
+            (near.le(far * F::splat(PADDING)).mask(), near.to_array())
+        };
+        let ((low, [a, b, c, d]), (high, [e, f, g, h])) = (half(0), half(1));
+        (low | high << 4, Near([a, b, c, d, e, f, g, h]))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod x86 {
+    use core::arch::x86_64::*;
+
+    use super::*;
+    use crate::lanes::Sse;
+    use crate::level::Level;
+    use crate::node::Bvh;
+    use crate::ray::{Closest, Leaves};
+    use crate::traverse::walk;
+
+    /// One 256-bit register. Made only by the entry points below, on machines with AVX2.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Whole {
+        origin: [__m256; 3],
+        inverse: [__m256; 3],
+        first: [usize; 3],
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn prepare(ray: &Ray) -> Whole {
+        let (inverse, first) = reciprocal(ray);
+        let splat = |a: f32| _mm256_set1_ps(a);
+        Whole { origin: ray.o.map(splat), inverse: inverse.map(splat), first }
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn enter(w: &Whole, node: &Node, far: f32) -> (u32, Near) {
+        #[allow(unsafe_code)]
+        // SAFETY: each plane is eight floats, read unaligned. Guard: `all_levels_agree_with_brute_force`.
+        let plane = |p: usize| unsafe { _mm256_loadu_ps(node.planes[p].as_ptr()) };
+        let distance = |p: usize, a: usize| _mm256_mul_ps(_mm256_sub_ps(plane(p), w.origin[a]), w.inverse[a]);
+        let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(far));
+        for axis in 0..3 {
+            let p = w.first[axis];
+            // The second operand is what comes back if the first is NaN.
+            near = _mm256_max_ps(distance(p, axis), near);
+            far = _mm256_min_ps(distance(p ^ 1, axis), far);
+        }
+        let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(near, _mm256_mul_ps(far, _mm256_set1_ps(PADDING)));
+        let mut out = Near([0.0; WIDTH]);
+        #[allow(unsafe_code)]
+        // SAFETY: `Near` is eight floats, aligned to 32. Guard: as above.
+        unsafe {
+            _mm256_store_ps(out.0.as_mut_ptr(), near);
+        }
+        (_mm256_movemask_ps(inside) as u32, out)
+    }
+
+    impl BoxTest for Whole {
+        type Four = Sse;
+
+        #[inline(always)]
+        #[allow(unsafe_code)]
+        fn new(ray: &Ray) -> Self {
+            // SAFETY: only the entry points below instantiate the walk with `Whole`, and they check for AVX2.
+            // Guard: `levels_beyond_the_machine_fall_back`.
+            unsafe { prepare(ray) }
+        }
+
+        #[inline(always)]
+        #[allow(unsafe_code)]
+        fn enter(&self, node: &Node, far: f32) -> (u32, Near) {
+            // SAFETY: as in `new`.
+            unsafe { enter(self, node, far) }
+        }
+    }
+
+    /// The walk compiled for one set of features, behind a check that the machine has them.
+    macro_rules! entry_points {
+        ($closest:ident, $any:ident, $level:expr, $features:literal) => {
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+                    walk::closest::<Whole, L>(bvh, ray, leaves)
+                }
+                assert!($level <= Level::detect());
+                // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
+                unsafe { compiled(bvh, ray, leaves) }
+            }
+
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
+                    walk::any::<Whole, L>(bvh, ray, leaves)
+                }
+                assert!($level <= Level::detect());
+                // SAFETY: as above.
+                unsafe { compiled(bvh, ray, leaves) }
+            }
+        };
+    }
+
+    entry_points!(closest_avx2, any_avx2, Level::Avx2, "avx2,bmi1,bmi2,lzcnt,popcnt");
+    entry_points!(closest_avx512, any_avx512, Level::Avx512, "avx512f,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt");
+}

@@ -1,0 +1,131 @@
+//! From a ray to what it meets, at any [`Level`].
+//!
+//! Children are visited by increasing (entry distance, reference), a total order, and box tests are the same unfused
+//! operations everywhere, so every level walks the same way through the tree. Boxes are entered if
+//! `near <= far * PADDING`, which covers the rounding of the slab test (Ize 2013) and that of the shear in the
+//! triangle test.
+
+mod boxes;
+mod scalar;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
+use crate::level::Level;
+use crate::node::Bvh;
+use crate::ray::{Closest, Leaves, Ray};
+
+/// `1 + 8 ulp`. Ize's bound for the slab test alone is `1 + 2 gamma(3)`, about 1.0000004.
+pub(crate) const PADDING: f32 = 1.000_000_95;
+
+impl Bvh {
+    /// The closest hit of `ray`, or `None`.
+    ///
+    /// Of several at exactly the same `t`, triangles come before user primitives, and lower indices before higher.
+    #[inline]
+    pub fn intersect<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+        match level.min(Level::detect()) {
+            Level::Scalar => scalar::closest(self, ray, leaves),
+            Level::Neon => walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => walk::closest::<boxes::Halves<crate::lanes::Sse>, L>(self, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => boxes::x86::closest_avx2(self, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => boxes::x86::closest_avx512(self, ray, leaves),
+            #[cfg(not(target_arch = "x86_64"))]
+            Level::Sse | Level::Avx2 | Level::Avx512 => {
+                walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves)
+            }
+        }
+    }
+
+    /// Whether `ray` meets anything.
+    #[inline]
+    pub fn occluded<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> bool {
+        match level.min(Level::detect()) {
+            Level::Scalar => scalar::any(self, ray, leaves),
+            Level::Neon => walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => walk::any::<boxes::Halves<crate::lanes::Sse>, L>(self, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => boxes::x86::any_avx2(self, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => boxes::x86::any_avx512(self, ray, leaves),
+            #[cfg(not(target_arch = "x86_64"))]
+            Level::Sse | Level::Avx2 | Level::Avx512 => {
+                walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves)
+            }
+        }
+    }
+}
+
+/// Whether `ray` can meet anything at all: finite origin and direction, some direction, and a positive length.
+#[inline(always)]
+fn is_proper(ray: &Ray) -> bool {
+    let [ox, oy, oz] = ray.o;
+    let [dx, dy, dz] = ray.d;
+    // Zero times anything finite is zero; NaN and infinities give NaN.
+    let zero = (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0);
+    zero == 0.0 && ray.t_max > 0.0 && (dx != 0.0 || dy != 0.0 || dz != 0.0)
+}
+
+/// The closest hit so far, with the order that breaks ties.
+struct Best<U> {
+    t: f32,
+    /// Triangle index, or [`Best::USERS`] plus user index; 0 before there is any hit, so that nothing ties with `t_max`.
+    rank: u32,
+    u: f32,
+    v: f32,
+    user: Option<U>,
+    found: bool,
+}
+
+impl<U: Copy> Best<U> {
+    const USERS: u32 = 1 << 30;
+
+    #[inline(always)]
+    fn new(t_max: f32) -> Self {
+        Self { t: t_max, rank: 0, u: 0.0, v: 0.0, user: None, found: false }
+    }
+
+    #[inline(always)]
+    fn is_beaten_by(&self, t: f32, rank: u32) -> bool {
+        t < self.t || (t == self.t && rank < self.rank)
+    }
+
+    #[inline(always)]
+    fn offer_triangle<L: Leaves>(&mut self, leaves: &L, ray: &Ray, id: u32, t: f32, u: f32, v: f32) {
+        use crate::node::Block;
+        let index = id & Block::INDEX;
+        if self.is_beaten_by(t, index)
+            && (!L::HAS_FILTER || id & Block::FILTERED == 0 || leaves.accept(index, ray, t, u, v))
+        {
+            (self.t, self.rank, self.u, self.v, self.found) = (t, index, u, v, true);
+        }
+    }
+
+    /// Asks about user primitive `index`.
+    #[inline(always)]
+    fn offer_user<L: Leaves<UserHit = U>>(&mut self, leaves: &L, ray: &Ray, index: u32) {
+        let t_max = if self.found { self.t.next_up() } else { self.t };
+        if let Some((t, hit)) = leaves.intersect(index, &Ray { t_max, ..*ray })
+            && self.is_beaten_by(t, Self::USERS + index)
+        {
+            (self.t, self.rank, self.user, self.found) = (t, Self::USERS + index, Some(hit), true);
+        }
+    }
+
+    #[inline(always)]
+    fn finish(self) -> Option<Closest<U>> {
+        use crate::ray::Hit;
+        if !self.found {
+            return None;
+        }
+        Some(match self.user {
+            Some(hit) if self.rank >= Self::USERS => Closest::User { t: self.t, user: self.rank - Self::USERS, hit },
+            _ => Closest::Triangle(Hit { t: self.t, u: self.u, v: self.v, primitive: self.rank }),
+        })
+    }
+}

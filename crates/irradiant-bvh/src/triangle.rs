@@ -1,0 +1,208 @@
+//! Ray against triangle, watertight.
+//!
+//! Woop, Benthin, Wald 2013 (JCGT 2(1)): translate and shear so that the ray is the z axis, then look at the signs of
+//! three 2D edge functions. An edge shared by two triangles gives both the same number up to sign, so no ray slips
+//! between. Where a single-precision edge function is zero, tiny or overflows, the triangle is done again in `f64`,
+//! whose products of two `f32` are exact. Rounding is monotonic, so the single-precision sign, when not zero, is right:
+//! the two ways never disagree about a side.
+//!
+//! A hit must be farther than the error bound of its own `t` (Pharr et al. 2023, section 6.8.4), so a ray leaving a
+//! surface does not meet it again because of rounding alone. We take differences of plain products where they fuse.
+
+use crate::lanes::Four;
+use crate::node::{BLOCK, Block};
+use crate::ray::Ray;
+
+/// `f32` rounding unit.
+const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
+
+/// Error factor of `n` roundings (Higham 2002, lemma 3.1).
+const fn gamma(n: i32) -> f32 {
+    ((n as f64 * UNIT) / (1.0 - n as f64 * UNIT)) as f32
+}
+
+/// Edge functions outside this range are evaluated again in `f64`: below, products lose bits; above, they overflow.
+const SMALLEST_EDGE: f32 = 1.0 / (1u128 << 100) as f32;
+const LARGEST_EDGE: f32 = (1u128 << 100) as f32;
+
+/// The shear that turns a ray into the z axis; the same for every triangle it meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shear {
+    /// The axes called x, y, z below; z is the one along which the ray moves fastest.
+    axes: [usize; 3],
+    /// The ray's origin along those.
+    origin: [f32; 3],
+    /// Shears of x and y, scale of z.
+    shear: [f32; 3],
+}
+
+impl Shear {
+    #[inline(always)]
+    pub fn new(ray: &Ray) -> Self {
+        let [x, y, z] = ray.d.map(f32::abs);
+        let axes = if x > y && x > z {
+            [1, 2, 0]
+        } else if y > z {
+            [2, 0, 1]
+        } else {
+            [0, 1, 2]
+        };
+        let dz = ray.d[axes[2]];
+        Self { axes, origin: axes.map(|a| ray.o[a]), shear: [-ray.d[axes[0]] / dz, -ray.d[axes[1]] / dz, 1.0 / dz] }
+    }
+}
+
+/// A candidate hit: `t`, and the weights of vertices 1 and 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Candidate {
+    pub t: f32,
+    pub u: f32,
+    pub v: f32,
+}
+
+/// The specification: the hit of `vertices` with `t` beyond its error bound, whatever its upper end.
+///
+/// The lanes of [`intersect_block`] do the same operations in the same order.
+#[inline]
+pub(crate) fn intersect(vertices: &[[f32; 3]; 3], shear: &Shear) -> Option<Candidate> {
+    let [kx, ky, kz] = shear.axes;
+    let [ox, oy, oz] = shear.origin;
+    let [sx, sy, sz] = shear.shear;
+    let sheared = vertices.map(|p| {
+        let z = p[kz] - oz;
+        [(p[kx] - ox) + sx * z, (p[ky] - oy) + sy * z, z]
+    });
+    let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = sheared;
+    let e0 = x1 * y2 - y1 * x2;
+    let e1 = x2 * y0 - y2 * x0;
+    let e2 = x0 * y1 - y0 * x1;
+    let any = |f: fn(&f32) -> bool| [e0, e1, e2].iter().any(f);
+    if any(|&e| e < 0.0) && any(|&e| e > 0.0) {
+        return None;
+    }
+    if !any(|&e| e.abs() < SMALLEST_EDGE) && [e0, e1, e2].iter().all(|&e| e.abs() <= LARGEST_EDGE) {
+        let (z0, z1, z2) = (z0 * sz, z1 * sz, z2 * sz);
+        let inverse = 1.0 / ((e0 + e1) + e2);
+        let t = ((e0 * z0 + e1 * z1) + e2 * z2) * inverse;
+        let max_x = x0.abs().max(x1.abs()).max(x2.abs());
+        let max_y = y0.abs().max(y1.abs()).max(y2.abs());
+        let max_z = z0.abs().max(z1.abs()).max(z2.abs());
+        let max_e = e0.abs().max(e1.abs()).max(e2.abs());
+        let delta_x = gamma(5) * (max_x + max_z);
+        let delta_y = gamma(5) * (max_y + max_z);
+        let delta_z = gamma(3) * max_z;
+        let delta_e = 2.0 * ((gamma(2) * max_x * max_y + delta_y * max_x) + delta_x * max_y);
+        let delta_t = 3.0 * ((gamma(3) * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
+        return (t > delta_t).then_some(Candidate { t, u: e1 * inverse, v: e2 * inverse });
+    }
+    intersect_in_double(&sheared, sz)
+}
+
+/// The same in `f64` from the sheared vertices on; zero edge functions count as inside.
+#[cold]
+#[inline(never)]
+fn intersect_in_double(sheared: &[[f32; 3]; 3], sz: f32) -> Option<Candidate> {
+    let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = sheared.map(|p| p.map(f64::from));
+    let e = [x1 * y2 - y1 * x2, x2 * y0 - y2 * x0, x0 * y1 - y0 * x1];
+    if e.iter().any(|&e| e < 0.0) && e.iter().any(|&e| e > 0.0) {
+        return None;
+    }
+    let det = (e[0] + e[1]) + e[2];
+    if det == 0.0 {
+        return None;
+    }
+    let [z0, z1, z2] = [z0, z1, z2].map(|z| z * f64::from(sz));
+    let inverse = 1.0 / det;
+    let t = ((e[0] * z0 + e[1] * z1) + e[2] * z2) * inverse;
+    let max = |a: f64, b: f64, c: f64| a.abs().max(b.abs()).max(c.abs());
+    let (max_x, max_y, max_z, max_e) = (max(x0, x1, x2), max(y0, y1, y2), max(z0, z1, z2), max(e[0], e[1], e[2]));
+    // The sheared vertices still carry single-precision errors; the rest is exact by comparison, but the bound is kept
+    // as it is so that a triangle does not become closer to the origin by being met on an edge.
+    let g = |n| f64::from(gamma(n));
+    let (delta_x, delta_y, delta_z) = (g(5) * (max_x + max_z), g(5) * (max_y + max_z), g(3) * max_z);
+    let delta_e = 2.0 * (g(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
+    let delta_t = 3.0 * (g(3) * max_e * max_z + delta_e * max_z + delta_z * max_e) * inverse.abs();
+    (t > delta_t).then_some(Candidate { t: t as f32, u: (e[1] * inverse) as f32, v: (e[2] * inverse) as f32 })
+}
+
+/// Candidates of a block: bit `i` of `mask` says whether lane `i` is one.
+pub(crate) struct Candidates {
+    pub mask: u32,
+    pub t: [f32; BLOCK],
+    pub u: [f32; BLOCK],
+    pub v: [f32; BLOCK],
+}
+
+impl Candidates {
+    const NONE: Self = Self { mask: 0, t: [0.0; BLOCK], u: [0.0; BLOCK], v: [0.0; BLOCK] };
+}
+
+/// Four triangles at once: the candidates with `t <= t_far`, bit for bit those of [`intersect`].
+#[inline(always)]
+pub(crate) fn intersect_block<F: Four>(block: &Block, shear: &Shear, t_far: f32) -> Candidates {
+    let [kx, ky, kz] = shear.axes;
+    let [ox, oy, oz] = shear.origin.map(F::splat);
+    let [sx, sy, sz] = shear.shear.map(F::splat);
+    let vertex = |i: usize| {
+        let p = &block.vertices[i];
+        let z = F::load(&p[kz]) - oz;
+        ((F::load(&p[kx]) - ox) + sx * z, (F::load(&p[ky]) - oy) + sy * z, z)
+    };
+    let ((x0, y0, z0), (x1, y1, z1), (x2, y2, z2)) = (vertex(0), vertex(1), vertex(2));
+    let e0 = x1 * y2 - y1 * x2;
+    let e1 = x2 * y0 - y2 * x0;
+    let e2 = x0 * y1 - y0 * x1;
+    // A NaN edge is passed over here (the signs of the others are right) or leaves the lane a candidate.
+    let zero = F::splat(0.0);
+    let lowest = e0.min(e1).min(e2);
+    let highest = e0.max(e1).max(e2);
+    let mut inside = (lowest.lt(zero) & zero.lt(highest)).mask() ^ 0xf;
+    if inside == 0 {
+        return Candidates::NONE;
+    }
+    let (a0, a1, a2) = (e0.abs(), e1.abs(), e2.abs());
+    let far = F::splat(LARGEST_EDGE);
+    let near = F::splat(SMALLEST_EDGE);
+    let sound = ((a0.le(far) & a1.le(far)) & (a2.le(far) & near.le(a0))) & (near.le(a1) & near.le(a2));
+    let strange = inside & !sound.mask();
+    inside &= sound.mask();
+
+    let (z0, z1, z2) = (z0 * sz, z1 * sz, z2 * sz);
+    let inverse = F::splat(1.0) / ((e0 + e1) + e2);
+    let t = ((e0 * z0 + e1 * z1) + e2 * z2) * inverse;
+    inside &= (t.le(F::splat(t_far)) & zero.lt(t)).mask();
+    if inside | strange == 0 {
+        return Candidates::NONE;
+    }
+    let max_x = x0.abs().max(x1.abs()).max(x2.abs());
+    let max_y = y0.abs().max(y1.abs()).max(y2.abs());
+    let max_z = z0.abs().max(z1.abs()).max(z2.abs());
+    let max_e = a0.max(a1).max(a2);
+    let g = |n: i32| F::splat(gamma(n));
+    let delta_x = g(5) * (max_x + max_z);
+    let delta_y = g(5) * (max_y + max_z);
+    let delta_z = g(3) * max_z;
+    let delta_e = F::splat(2.0) * ((g(2) * max_x * max_y + delta_y * max_x) + delta_x * max_y);
+    let delta_t = F::splat(3.0) * ((g(3) * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
+    inside &= delta_t.lt(t).mask();
+    let mut out =
+        Candidates { mask: inside, t: t.to_array(), u: (e1 * inverse).to_array(), v: (e2 * inverse).to_array() };
+    if strange != 0 {
+        again_in_double(block, shear, t_far, strange, &mut out);
+    }
+    out
+}
+
+#[cold]
+#[inline(never)]
+fn again_in_double(block: &Block, shear: &Shear, t_far: f32, mut lanes: u32, out: &mut Candidates) {
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let vertices = block.vertices.map(|p| p.map(|c| c[lane]));
+        if let Some(hit) = intersect(&vertices, shear).filter(|hit| hit.t <= t_far) {
+            out.mask |= 1 << lane;
+            (out.t[lane], out.u[lane], out.v[lane]) = (hit.t, hit.u, hit.v);
+        }
+    }
+}
