@@ -8,4 +8,4 @@
 pub mod bsdf;
 pub mod bxdf;
 pub mod interaction;
-pub mod film;
+
