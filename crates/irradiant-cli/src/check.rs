@@ -34,14 +34,25 @@ pub fn run(arguments: &CheckArguments) -> Exit {
     let facts = job.scene.facts();
     println!("{}", file.name);
     let bounds = job.scene.new_film().bounds();
-    println!("  film         {} x {} pixels, {} samples each", bounds.width(), bounds.height(), job.scene.samples_per_pixel);
+    println!(
+        "  film         {} x {} pixels, {} samples each",
+        bounds.width(),
+        bounds.height(),
+        job.scene.samples_per_pixel
+    );
     println!("  integrator   {} ({})", job.header.integrator, job.header.estimate);
     println!("  sampler      {}", job.header.sampler);
     println!("  camera       {}", facts.camera);
-    println!("  shapes       {} ({} triangles, {} other primitives, {} instances)", facts.shapes, facts.triangles, facts.other_primitives, facts.instances);
+    println!(
+        "  shapes       {} ({} triangles, {} other primitives, {} instances)",
+        facts.shapes, facts.triangles, facts.other_primitives, facts.instances
+    );
     println!("  materials    {}", facts.materials);
     println!("  textures     {} ({} images, {:.1} MB)", facts.textures, facts.images, facts.image_bytes as f64 / 1e6);
-    println!("  lights       {} ({} from emitting shapes, {} infinite)", facts.lights, facts.area_lights, facts.infinite_lights);
+    println!(
+        "  lights       {} ({} from emitting shapes, {} infinite)",
+        facts.lights, facts.area_lights, facts.infinite_lights
+    );
     println!("  memory       {:.1} MB of geometry", facts.geometry_bytes as f64 / 1e6);
     let not_honoured: Vec<&str> = job.report.diagnostics.not_honoured().collect();
     if not_honoured.is_empty() {

@@ -188,7 +188,11 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
-            return Err(Error::Settings(format!("--output {}: there is no folder {}", path.display(), folder.display())));
+            return Err(Error::Settings(format!(
+                "--output {}: there is no folder {}",
+                path.display(),
+                folder.display()
+            )));
         }
     }
     Ok(paths)

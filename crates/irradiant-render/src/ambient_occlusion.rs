@@ -28,7 +28,8 @@ impl Integrator for AmbientOcclusionIntegrator {
                 let at = scene.geometry.interaction(&ray, &hit);
                 let footprint = scene.texture_context(&at, Some(camera_ray));
                 let mix = sample.stream.mix(0);
-                let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+                let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix)
+                else {
                     ray = at.spawn_ray(ray.d);
                     continue;
                 };

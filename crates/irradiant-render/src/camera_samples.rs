@@ -33,10 +33,7 @@ pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample
     let draws = stream.camera();
     let lambda = scene.sample_wavelengths(draws.wavelength);
     let filtered = scene.filter.sample(scene.film_draw(draws.film));
-    let film = Point2::new(
-        pixel[0] as f32 + 0.5 + filtered.offset[0],
-        pixel[1] as f32 + 0.5 + filtered.offset[1],
-    );
+    let film = Point2::new(pixel[0] as f32 + 0.5 + filtered.offset[0], pixel[1] as f32 + 0.5 + filtered.offset[1]);
     let camera_ray = scene.camera.generate_ray(film, draws.lens, draws.time);
     CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
 }

@@ -85,7 +85,8 @@ impl PathIntegrator {
 
             let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
             let mix = stream.mix(depth);
-            let Some(mut bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+            let Some(mut bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix)
+            else {
                 // An interface: no surface, only a boundary. Weighing lights across it would need its light sampling too.
                 ray = at.spawn_ray(ray.d);
                 if let Some(p) = &mut previous {
@@ -283,7 +284,13 @@ fn direct_light<R: PathRecorder>(
 #[inline]
 pub fn power_heuristic(a: f32, b: f32) -> f32 {
     let (a, b) = (a * a, b * b);
-    if a.is_infinite() { 1.0 } else if a > 0.0 { a / (a + b) } else { 0.0 }
+    if a.is_infinite() {
+        1.0
+    } else if a > 0.0 {
+        a / (a + b)
+    } else {
+        0.0
+    }
 }
 
 /// After this many events even a path that loses nothing is ended now and then, so that closed scenes of albedo 1 end.

@@ -36,7 +36,8 @@ impl Integrator for RandomWalkIntegrator {
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
                 let mix = sample.stream.mix(depth);
-                let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+                let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix)
+                else {
                     ray = at.spawn_ray(ray.d);
                     stats.bounce_rays += 1;
                     continue;

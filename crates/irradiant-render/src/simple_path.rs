@@ -43,7 +43,8 @@ impl Integrator for SimplePathIntegrator {
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
                 let mix = sample.stream.mix(depth);
-                let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+                let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix)
+                else {
                     // Light samples do not pass interfaces: what lies behind one must be found by chance.
                     count_emission = true;
                     ray = at.spawn_ray(ray.d);
@@ -59,7 +60,8 @@ impl Integrator for SimplePathIntegrator {
                 if self.sample_lights && bsdf.flags().is_non_specular() {
                     let draws = sample.stream.light(depth);
                     if let Some((light, pmf)) = scene.light_sampler.sample(&at.reference(), draws.pick)
-                        && let Some(s) = scene.lights[light].sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
+                        && let Some(s) =
+                            scene.lights[light].sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
                     {
                         let f = bsdf.f(at.wo, s.wi, TransportMode::Radiance) * s.wi.dot(bsdf.frame.z).abs();
                         if !f.is_black() {
@@ -77,7 +79,13 @@ impl Integrator for SimplePathIntegrator {
                     count_emission = !self.sample_lights || s.lobe.is_specular();
                     s.wi
                 } else {
-                    let (wi, pdf) = uniform_direction(at.wo, bsdf.frame.z, bsdf.flags().is_reflective(), bsdf.flags().is_transmissive(), draws.uv);
+                    let (wi, pdf) = uniform_direction(
+                        at.wo,
+                        bsdf.frame.z,
+                        bsdf.flags().is_reflective(),
+                        bsdf.flags().is_transmissive(),
+                        draws.uv,
+                    );
                     throughput *= bsdf.f(at.wo, wi, TransportMode::Radiance) * (wi.dot(bsdf.frame.z).abs() / pdf);
                     count_emission = !self.sample_lights;
                     wi
@@ -114,7 +122,13 @@ pub(crate) fn environment(scene: &Scene, ray: &Ray, lambda: &Wavelengths) -> Sam
 }
 
 /// Uniform over the directions that the surface can scatter to: a hemisphere or the sphere.
-fn uniform_direction(wo: Vec3, n: Vec3, reflective: bool, transmissive: bool, u: irradiant_math::Point2) -> (Vec3, f32) {
+fn uniform_direction(
+    wo: Vec3,
+    n: Vec3,
+    reflective: bool,
+    transmissive: bool,
+    u: irradiant_math::Point2,
+) -> (Vec3, f32) {
     if reflective && transmissive {
         return (warp::uniform_sphere(u), 1.0 / (4.0 * PI));
     }

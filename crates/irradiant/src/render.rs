@@ -86,11 +86,7 @@ impl Job {
             integrator,
             max_depth,
             regularize: integrator_desc.regularize,
-            session: SessionSettings {
-                threads: settings.threads,
-                samples_per_pixel,
-                time_limit: settings.time_limit,
-            },
+            session: SessionSettings { threads: settings.threads, samples_per_pixel, time_limit: settings.time_limit },
         };
         job.header.estimate = estimate_label(job.integrator().as_ref(), &job.scene);
         Ok(job)

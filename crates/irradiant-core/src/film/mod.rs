@@ -3,8 +3,10 @@
 //! There is one film. What varies is which layers it keeps beside radiance ([`Layer`]). Each sample touches exactly
 //! one pixel (reconstruction by filter importance sampling; Ernst et al. 2006), so a tile has one writer.
 
-pub mod exact;
 mod develop;
+pub mod exact;
+pub mod filter;
+
 pub use develop::DevelopOptions;
 
 use exact::{ExactSum, SquareSum};
@@ -324,7 +326,9 @@ impl Film {
 
     /// Adds the sums of another film of the same pixels and layers (other samples of the same picture).
     pub fn merge(&mut self, other: &Film) -> Result<(), FilmMismatch> {
-        if self.full_resolution != other.full_resolution || self.layers != other.layers || self.bounds() != other.bounds()
+        if self.full_resolution != other.full_resolution
+            || self.layers != other.layers
+            || self.bounds() != other.bounds()
         {
             return Err(FilmMismatch);
         }
@@ -420,6 +424,6 @@ mod tests {
         }
         let v = pixel.variance();
         assert!((v[0] - 7.0 / 3.0).abs() < 1e-12 && v[1].abs() < 1e-12);
-        assert_eq!(std::mem::size_of::<Pixel>(), 112);
+        assert_eq!(size_of::<Pixel>(), 112);
     }
 }
