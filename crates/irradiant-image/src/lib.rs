@@ -3,6 +3,16 @@
 //! Knows nothing of scenes, spectra or files beyond bytes in and bytes out; the only functions
 //! that touch a disk are [`read_file`] and [`atomic_write`].
 //!
+//! ```
+//! use irradiant_image::{FileFormat, Image, ReadOptions, compare, read, write};
+//!
+//! let ramp = Image::from_fn(64, 32, ["R", "G", "B"], |x, y| [x as f32 / 64.0, y as f32 / 32.0, 0.5]);
+//! let file = write(&ramp, FileFormat::Exr)?;
+//! let back = read(&file, "ramp.exr", &ReadOptions::default())?;
+//! assert_eq!(compare(&back, &ramp).unwrap().mse, 0.0);
+//! # Ok::<(), irradiant_image::ImageError>(())
+//! ```
+//!
 //! # Layout
 //!
 //! - [`image`](mod@image): [`Image`], a rectangle of pixels with named channels, kept in 8 bits, half or float.

@@ -32,6 +32,19 @@ pub enum MipFilter {
     Ewa,
 }
 
+impl MipFilter {
+    /// The filter that a pbrt-v4 scene calls so: "point", "bilinear", "trilinear", "EWA" or "ewa".
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "point" => Some(Self::Point),
+            "bilinear" => Some(Self::Bilinear),
+            "trilinear" => Some(Self::Trilinear),
+            "EWA" | "ewa" => Some(Self::Ewa),
+            _ => None,
+        }
+    }
+}
+
 /// Filter, wrap and anisotropy of a [`MipMap`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MipOptions {
@@ -250,9 +263,7 @@ impl MipMap {
         match self.options.filter {
             MipFilter::Point => {
                 let Level { width, height, .. } = self.levels[fine];
-                // Halves round away from 0, as C's round does.
-                let x = (st[0] * width as f32 - 0.5).round() as i32;
-                let y = (st[1] * height as f32 - 0.5).round() as i32;
+                let (x, y) = (floor_i32(st[0] * width as f32), floor_i32(st[1] * height as f32));
                 self.texel_index(&self.levels[fine], x, y).map_or([0.0; N], single)
             }
             MipFilter::Bilinear => self.bilinear(fine, st, blended),
@@ -377,7 +388,7 @@ impl MipMap {
             // Only the texels of this row that the ellipse reaches; those at its rim weigh nothing.
             let (linear, constant) = (b * dy, c * dy * dy);
             let discriminant = linear * linear - 4.0 * a * (constant - 1.0);
-            if !(discriminant >= 0.0) {
+            if discriminant < 0.0 {
                 continue;
             }
             let (centre, reach) = (s - linear * half_over_a, discriminant.sqrt() * half_over_a);
