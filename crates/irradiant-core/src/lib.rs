@@ -2,11 +2,13 @@
 //!
 //! # Layout
 //! In reading order: [`interaction`] (where a path met something), [`geometry`] (what rays meet),
-//! [`bxdf`] and [`bsdf`] (how light scatters there).
+//! [`bxdf`] and [`bsdf`] (how light scatters there), [`sampler`] (random numbers), [`film`] (sums and counts).
 //! Nothing here reads files, clocks or the environment.
 #![forbid(unsafe_code)]
 
 pub mod bsdf;
 pub mod bxdf;
+pub mod film;
 pub mod geometry;
 pub mod interaction;
+pub mod sampler;
