@@ -4,7 +4,7 @@
 use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::simple_path::environment;
-use irradiant_core::bxdf::TransportMode;
+use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::film::FilmTile;
 use irradiant_core::scene::Scene;
 use irradiant_math::warp;
@@ -32,7 +32,7 @@ impl Integrator for RandomWalkIntegrator {
                 };
                 let at = scene.geometry.interaction(&ray, &hit);
                 if let Some(light) = at.light {
-                    radiance += throughput * scene.lights[light].emitted(&at, at.wo, lambda);
+                    radiance += throughput * scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
                 let mix = sample.stream.mix(depth);
