@@ -2,13 +2,20 @@
 //!
 //! # Layout
 //! In reading order: [`interaction`] (where a path met something), [`geometry`] (what rays meet),
-//! [`bxdf`] and [`bsdf`] (how light scatters there), [`sampler`] (random numbers), [`film`] (sums and counts).
-//! Nothing here reads files, clocks or the environment.
+//! [`bxdf`] and [`bsdf`] (how light scatters there), [`material`] and [`texture`] (what decides that), [`light`] and
+//! [`light_sampler`], [`camera`], [`sampler`] (random numbers), [`film`] (sums and counts), and [`scene`], which holds
+//! them all. Nothing here reads files, clocks or the environment.
 #![forbid(unsafe_code)]
 
 pub mod bsdf;
 pub mod bxdf;
+pub mod camera;
 pub mod film;
 pub mod geometry;
 pub mod interaction;
+pub mod light;
+pub mod light_sampler;
+pub mod material;
 pub mod sampler;
+pub mod scene;
+pub mod texture;
