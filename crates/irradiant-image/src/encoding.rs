@@ -18,6 +18,18 @@ pub enum Encoding {
 }
 
 impl Encoding {
+    /// The encoding that a pbrt-v4 scene calls so: "linear", "sRGB", or "gamma" and a positive number.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "linear" => Some(Self::Linear),
+            "sRGB" => Some(Self::Srgb),
+            _ => {
+                let gamma: f32 = name.strip_prefix("gamma ")?.trim().parse().ok()?;
+                (gamma.is_finite() && gamma > 0.0).then_some(Self::Gamma(gamma))
+            }
+        }
+    }
+
     /// The linear value of a code value in [0, 1]; codes outside are extended as the curve's formula says, below 0 mirrored.
     pub fn decode(self, code: f32) -> f32 {
         match self {
@@ -160,6 +172,15 @@ mod tests {
                 let distance = (f32::from(encoder.encode(linear)) - code).abs();
                 assert!(distance <= 0.5001, "{encoding:?} {linear}: off by {distance}");
             }
+        }
+    }
+
+    #[test]
+    fn names_of_scenes_are_understood() {
+        assert_eq!(Encoding::from_name("sRGB"), Some(Encoding::Srgb));
+        assert_eq!(Encoding::from_name("gamma 2.2"), Some(Encoding::Gamma(2.2)));
+        for name in ["gamma", "gamma 0", "gamma -1", "gamma nan", "srgb", ""] {
+            assert_eq!(Encoding::from_name(name), None, "{name:?}");
         }
     }
 

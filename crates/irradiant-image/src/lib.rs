@@ -3,6 +3,16 @@
 //! Knows nothing of scenes, spectra or files beyond bytes in and bytes out; the only functions
 //! that touch a disk are [`read_file`] and [`atomic_write`].
 //!
+//! ```
+//! use irradiant_image::{FileFormat, Image, ReadOptions, compare, read, write};
+//!
+//! let ramp = Image::from_fn(64, 32, ["R", "G", "B"], |x, y| [x as f32 / 64.0, y as f32 / 32.0, 0.5]);
+//! let file = write(&ramp, FileFormat::Exr)?;
+//! let back = read(&file, "ramp.exr", &ReadOptions::default())?;
+//! assert_eq!(compare(&back, &ramp).unwrap().mse, 0.0);
+//! # Ok::<(), irradiant_image::ImageError>(())
+//! ```
+//!
 //! # Layout
 //!
 //! - [`image`](mod@image): [`Image`], a rectangle of pixels with named channels, kept in 8 bits, half or float.
@@ -20,22 +30,22 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic;
-pub mod wrap;
 pub mod encoding;
 pub mod error;
+pub mod flip;
 pub mod format;
 pub mod image;
 pub mod metadata;
-pub mod resize;
+pub mod metrics;
 pub mod mip;
-//pub mod metrics;
-//pub mod flip;
-//pub mod tone;
+pub mod resize;
+pub mod tone;
+pub mod wrap;
 
 pub use atomic::atomic_write;
 pub use encoding::Encoding;
 pub use error::ImageError;
-//pub use flip::{FlipOptions, flip_hdr, flip_ldr};
+pub use flip::{Flip, FlipOptions, flip_hdr, flip_ldr};
 pub use format::exr_write::{Compression, write_exr};
 pub use format::hdr::write_hdr;
 pub use format::jpeg::write_jpeg;
@@ -45,7 +55,7 @@ pub use format::qoi::write_qoi;
 pub use format::{FileFormat, ReadOptions, read, read_file, write};
 pub use image::{Image, PixelFormat, Pixels};
 pub use metadata::{Attribute, Chromaticities, Metadata};
-//pub use metrics::{Comparison, compare};
+pub use metrics::{CompareError, Comparison, WorstTile, compare};
 pub use mip::{MipFilter, MipMap, MipOptions, WrapMode};
 pub use resize::ResizeFilter;
-//pub use tone::{ToneCurve, ToneOptions, to_srgb8};
+pub use tone::{ToneCurve, ToneOptions, false_colour, to_srgb8, tone_map};

@@ -32,6 +32,19 @@ pub enum MipFilter {
     Ewa,
 }
 
+impl MipFilter {
+    /// The filter that a pbrt-v4 scene calls so: "point", "bilinear", "trilinear", "EWA" or "ewa".
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "point" => Some(Self::Point),
+            "bilinear" => Some(Self::Bilinear),
+            "trilinear" => Some(Self::Trilinear),
+            "EWA" | "ewa" => Some(Self::Ewa),
+            _ => None,
+        }
+    }
+}
+
 /// Filter, wrap and anisotropy of a [`MipMap`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MipOptions {
@@ -250,9 +263,7 @@ impl MipMap {
         match self.options.filter {
             MipFilter::Point => {
                 let Level { width, height, .. } = self.levels[fine];
-                // Halves round away from 0, as C's round does.
-                let x = (st[0] * width as f32 - 0.5).round() as i32;
-                let y = (st[1] * height as f32 - 0.5).round() as i32;
+                let (x, y) = (floor_i32(st[0] * width as f32), floor_i32(st[1] * height as f32));
                 self.texel_index(&self.levels[fine], x, y).map_or([0.0; N], single)
             }
             MipFilter::Bilinear => self.bilinear(fine, st, blended),
@@ -377,7 +388,7 @@ impl MipMap {
             // Only the texels of this row that the ellipse reaches; those at its rim weigh nothing.
             let (linear, constant) = (b * dy, c * dy * dy);
             let discriminant = linear * linear - 4.0 * a * (constant - 1.0);
-            if !(discriminant >= 0.0) {
+            if discriminant < 0.0 {
                 continue;
             }
             let (centre, reach) = (s - linear * half_over_a, discriminant.sqrt() * half_over_a);
@@ -448,7 +459,9 @@ fn halve(samples: &[f32], width: usize, height: usize, channels: usize) -> Vec<f
         for x in 0..new_width {
             let base = (2 * y * width + 2 * x) * channels;
             for channel in base..base + channels {
-                let sum = samples[channel] + samples[channel + right] + samples[channel + below]
+                let sum = samples[channel]
+                    + samples[channel + right]
+                    + samples[channel + below]
                     + samples[channel + right + below];
                 coarse.push(0.25 * sum);
             }
@@ -511,7 +524,8 @@ mod tests {
             for level in 0..map.levels() {
                 let (w, h) = map.level_size(level);
                 for channel in 0..3 {
-                    let texels = (0..w * h).map(|i| f64::from(map.texel(level, (i % w) as i32, (i / w) as i32, channel)));
+                    let texels =
+                        (0..w * h).map(|i| f64::from(map.texel(level, (i % w) as i32, (i / w) as i32, channel)));
                     assert!((texels.sum::<f64>() / (w * h) as f64 - mean[channel]).abs() < 1e-6);
                 }
             }
@@ -642,7 +656,12 @@ mod tests {
                     }
                 }
                 // A texel may fall on the other side of a bucket's border: 1.8 % of its weight.
-                assert!((f64::from(found[0]) - sum / weights).abs() < 2e-3, "{step} {level}: {} {}", found[0], sum / weights);
+                assert!(
+                    (f64::from(found[0]) - sum / weights).abs() < 2e-3,
+                    "{step} {level}: {} {}",
+                    found[0],
+                    sum / weights
+                );
             }
         }
     }
@@ -661,7 +680,10 @@ mod tests {
     #[test]
     fn scalars_are_means_or_alpha() {
         let rgb = Image::from_fn(2, 2, ["R", "G", "B"], |_, _| [0.3, 0.6, 0.0]);
-        assert!((map(&rgb, MipFilter::Bilinear, WrapMode::Repeat).filter_f32([0.3; 2], [0.0; 2], [0.0; 2]) - 0.3).abs() < 1e-7);
+        assert!(
+            (map(&rgb, MipFilter::Bilinear, WrapMode::Repeat).filter_f32([0.3; 2], [0.0; 2], [0.0; 2]) - 0.3).abs()
+                < 1e-7
+        );
         let rgba = Image::from_fn(2, 2, ["R", "G", "B", "A"], |x, _| [0.1, 0.2, 0.3, x as f32]);
         let alpha = map(&rgba, MipFilter::Bilinear, WrapMode::Clamp);
         assert!(alpha.has_alpha());

@@ -17,6 +17,17 @@ pub enum WrapMode {
 }
 
 impl WrapMode {
+    /// The mode that a pbrt-v4 scene calls so: "repeat", "black", "clamp" or "octahedralsphere".
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "repeat" => Some(Self::Repeat),
+            "black" => Some(Self::Black),
+            "clamp" => Some(Self::Clamp),
+            "octahedralsphere" => Some(Self::OctahedralSphere),
+            _ => None,
+        }
+    }
+
     /// The texel inside a picture of `width` x `height` that stands for (x, y), or `None` for black.
     pub fn remap(self, x: i32, y: i32, width: i32, height: i32) -> Option<(usize, usize)> {
         let inside = |x: i32, y: i32| Some((x as usize, y as usize));

@@ -202,8 +202,7 @@ fn atan_core(t: f64) -> f64 {
     let z2 = z * z;
     let z4 = z2 * z2;
     let low = (0.9999999999992436 - 0.33333333276849636 * z) + z2 * (0.1999999304596702 - 0.142853862605561 * z);
-    let high =
-        (0.11103451563136532 - 0.08992503246718883 * z) + z2 * (0.06973970393191921 - 0.03765104129649976 * z);
+    let high = (0.11103451563136532 - 0.08992503246718883 * z) + z2 * (0.06973970393191921 - 0.03765104129649976 * z);
     t * (low + z4 * high)
 }
 
@@ -257,8 +256,8 @@ fn asin_parts(ax: f64) -> (f64, bool) {
     let z2 = z * z;
     let z4 = z2 * z2;
     let low = (1.0000000000008284 + 0.16666666613082337 * z) + z2 * (0.07500005674339076 + 0.044640558118577034 * z);
-    let high = (0.030428232514128867 + 0.021854687048307064 * z)
-        + z2 * (0.020686728801278316 + 0.0019013011917725624 * z);
+    let high =
+        (0.030428232514128867 + 0.021854687048307064 * z) + z2 * (0.020686728801278316 + 0.0019013011917725624 * z);
     (s * (low + z4 * (high + z4 * 0.032972918847588364)), far)
 }
 
@@ -496,7 +495,10 @@ mod tests {
             assert_eq!(log2(exp2(k as f32)), k as f32);
         }
         assert_eq!((exp(f32::INFINITY), exp(f32::NEG_INFINITY), exp(0.0)), (f32::INFINITY, 0.0, 1.0));
-        assert_eq!((ln(1.0), ln(0.0), ln(-0.0), ln(f32::INFINITY)), (0.0, f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY));
+        assert_eq!(
+            (ln(1.0), ln(0.0), ln(-0.0), ln(f32::INFINITY)),
+            (0.0, f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY)
+        );
         assert!(exp(f32::NAN).is_nan() && ln(-1.0).is_nan() && ln(f32::NAN).is_nan() && exp2(f32::NAN).is_nan());
     }
 
@@ -517,7 +519,10 @@ mod tests {
             let (x, y) = (f32::from_bits(1f32.to_bits() - 10_000 + i), 100_000.0 + i as f32);
             assert!(ulps(pow(x, y), libm::pow(x as f64, y as f64)) < 0.55, "{x} {y}");
         }
-        assert_eq!((pow(-2.0, 3.0), pow(0.0, 0.0), pow(0.0, -1.0), pow(1.0, f32::INFINITY)), (-8.0, 1.0, f32::INFINITY, 1.0));
+        assert_eq!(
+            (pow(-2.0, 3.0), pow(0.0, 0.0), pow(0.0, -1.0), pow(1.0, f32::INFINITY)),
+            (-8.0, 1.0, f32::INFINITY, 1.0)
+        );
         assert!(pow(-2.0, 0.5).is_nan());
     }
 
@@ -537,7 +542,11 @@ mod tests {
         for y in [0.0f32, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN] {
             for x in [0.0f32, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN] {
                 let (got, exact) = (atan2(y, x), libm::atan2(y as f64, x as f64) as f32);
-                assert!(got == exact && got.is_sign_negative() == exact.is_sign_negative() || exact.is_nan() && got.is_nan(), "{y} {x}: {got}");
+                assert!(
+                    got == exact && got.is_sign_negative() == exact.is_sign_negative()
+                        || exact.is_nan() && got.is_nan(),
+                    "{y} {x}: {got}"
+                );
             }
         }
         assert!(acos(1.0000001).is_nan() && asin(-1.1).is_nan());

@@ -42,7 +42,7 @@ def array(name, doc, values):
 
 def write(file, front, text):
     with open(f"{OUT}/{file}.rs", "w") as out:
-        out.write(HEAD + "".join(f"//! {l}".rstrip() + "\n" for l in front) + "\n#![cfg_attr(rustfmt, rustfmt_skip)]\n\n" + text.rstrip() + "\n")
+        out.write(HEAD + "".join(f"//! {l}".rstrip() + "\n" for l in front) + "\n#![cfg_attr(rustfmt, rustfmt_skip)]\n#![allow(clippy::approx_constant)]\n\n" + text.rstrip() + "\n")
 
 
 # CIE 1931 standard colorimetric observer, 2 degrees, 1 nm.

@@ -154,7 +154,7 @@ impl ColorSpace {
 
     /// A smooth reflectance spectrum that looks like linear `rgb` under this space's illuminant.
     ///
-    /// Components are clamped to [0, 1] (NaN to 0). About 50 ns once the neighbourhood of the colour has
+    /// Components are clamped to [0, 1] (NaN to 0). About 60 ns once the neighbourhood of the colour has
     /// been seen, some 1.5 ms the first time (four columns of 64 fits). See [`crate::uplift`].
     #[inline]
     pub fn uplift(&self, rgb: [f32; 3]) -> SigmoidPolynomial {

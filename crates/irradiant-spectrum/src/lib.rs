@@ -3,7 +3,7 @@
 //! Layout, in reading order:
 //! - [`sampled`]: four lanes and their arithmetic;
 //! - [`wavelengths`]: what the lanes stand for, and how wavelengths are drawn;
-//! - [`stored`]: spectra at rest, evaluated in either basis;
+//! - [`stored`]: spectra at rest, evaluated in either basis; made of [`table`], [`rgb`] and [`emission`];
 //! - [`photometry`]: integrals against the CIE observer;
 //! - [`colorspace`]: RGB spaces; [`uplift`]: from RGB to smooth spectra;
 //! - [`sensor`]: from radiance to film RGB;
@@ -18,12 +18,17 @@
 //! Knows nothing of geometry or files.
 
 #![forbid(unsafe_code)]
+// max then min sends NaN to the lower bound, which clamp does not.
+#![allow(clippy::manual_clamp)]
 
 pub mod colorspace;
+pub mod emission;
 pub mod photometry;
+pub mod rgb;
 pub mod sampled;
 pub mod sensor;
 pub mod stored;
+pub mod table;
 pub mod uplift;
 pub mod wavelengths;
 
@@ -33,10 +38,13 @@ mod matrix;
 
 pub use colorspace::ColorSpace;
 pub use data::{named, names};
-pub use photometry::{CIE_Y_INTEGRAL, blackbody, inner_product, spectrum_to_photometric, spectrum_to_xyz};
+pub use emission::{Blackbody, blackbody, daylight};
+pub use photometry::{CIE_Y_INTEGRAL, inner_product, spectrum_to_photometric, spectrum_to_xyz};
+pub use rgb::{RgbAlbedo, RgbIlluminant, RgbUnbounded};
 pub use sampled::SampledSpectrum;
 pub use sensor::Sensor;
-pub use stored::{Curve, RgbAlbedo, RgbIlluminant, RgbUnbounded, Role, Spectrum, SpectrumError, daylight};
+pub use stored::{Curve, Role, Spectrum, SpectrumError};
+pub use table::Table;
 pub use uplift::SigmoidPolynomial;
 pub use wavelengths::{Basis, Wavelengths};
 

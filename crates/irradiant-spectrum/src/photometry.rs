@@ -47,18 +47,3 @@ pub fn spectrum_to_photometric(spectrum: &Spectrum) -> f32 {
         _ => y(&|i| f64::from(spectrum.eval(360.0 + i as f32))),
     }
 }
-
-/// Radiance emitted by a black body, W / (m^2 sr m), at `lambda` nm and `temperature` K; 0 for `temperature` <= 0.
-///
-/// Planck's law with the constants of pbrt-v4 (CODATA 2010). `f64`; for tables, not for transport.
-pub fn blackbody(lambda: f64, temperature: f64) -> f64 {
-    if temperature <= 0.0 {
-        return 0.0;
-    }
-    const C: f64 = 299_792_458.0;
-    const H: f64 = 6.626_069_57e-34;
-    const KB: f64 = 1.380_648_8e-23;
-    let l = lambda * 1e-9;
-    let exponent = (H * C) / (l * KB * temperature);
-    (2.0 * H * C * C) / (l * l * l * l * l * (f64::from(crate::elementary::exp(exponent as f32)) - 1.0))
-}

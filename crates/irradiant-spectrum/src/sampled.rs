@@ -78,8 +78,8 @@ impl SampledSpectrum {
     /// Whether no lane is infinite or NaN.
     #[inline]
     pub fn is_finite(self) -> bool {
-        // x - x is 0 for finite x and NaN otherwise.
-        let [a, b, c, d] = (self - self).0;
+        // 0 x is 0 for finite x and NaN otherwise.
+        let [a, b, c, d] = (self * 0.0).0;
         (a + b) + (c + d) == 0.0
     }
 

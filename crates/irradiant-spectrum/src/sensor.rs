@@ -6,9 +6,10 @@
 //! Lighting"; for the CIE observer it is the identity, or Bradford's adaptation if a white balance is asked for.
 
 use crate::data::{self, cie1931};
+use crate::emission::daylight;
 use crate::matrix::{self, Matrix};
 use crate::photometry::{CIE_Y_INTEGRAL, DENSE_LENGTH, xyz_of};
-use crate::stored::daylight;
+use crate::table::nearest_index;
 use crate::{Basis, ColorSpace, LAMBDA_MIN, SampledSpectrum, Wavelengths};
 
 /// A film's response to light.
@@ -115,9 +116,9 @@ impl Sensor {
         let weighted = radiance.safe_div(wavelengths.pdf());
         let mut sum = [0.0f32; 4];
         for lane in 0..4 {
-            // Wavelengths lie in [360, 830]; the clamp spares the bounds check its branch.
-            let i = ((wavelengths.lambda[lane] - (LAMBDA_MIN - 0.5)) as usize).min(DENSE_LENGTH - 1);
-            let response = self.response[i];
+            let Some(response) = self.response.get(nearest_index(wavelengths.lambda[lane] - LAMBDA_MIN)) else {
+                continue;
+            };
             for c in 0..4 {
                 sum[c] += response[c] * weighted[lane];
             }
@@ -210,7 +211,7 @@ mod tests {
         }
     }
 
-    // The 24 patches seen by the camera and by the observer, in linear RGB of white 1: a mistyped digit of a response shows.
+    // The 24 patches seen by the camera and by the observer, in linear RGB of white 1: the mean difference of all is 0.005 to 0.0073.
     #[test]
     fn cameras_see_the_chart_nearly_as_the_observer_does() {
         let space = ColorSpace::srgb();
@@ -235,7 +236,7 @@ mod tests {
                     mean += apart / 72.0;
                 }
             }
-            assert!(mean < 0.02, "{name}: {mean}");
+            assert!(mean < 0.008, "{name}: {mean}");
         }
     }
 

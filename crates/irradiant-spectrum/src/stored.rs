@@ -5,8 +5,10 @@
 //! Colour comes in by its [`Role`], which decides how RGB becomes a spectrum and how a spectrum
 //! becomes RGB for a render in the RGB basis.
 
-use crate::photometry::{CIE_Y_INTEGRAL, DENSE_LENGTH, xyz_of};
-use crate::uplift::SigmoidPolynomial;
+use crate::emission::Blackbody;
+use crate::photometry::{DENSE_LENGTH, xyz_of};
+use crate::rgb::{RgbAlbedo, RgbIlluminant, RgbUnbounded, lanes};
+use crate::table::{Table, eval_dense, sample_dense};
 use crate::{Basis, ColorSpace, LAMBDA_MAX, LAMBDA_MIN, SampledSpectrum, Wavelengths, matrix};
 use std::sync::Arc;
 
@@ -20,205 +22,6 @@ pub enum Role {
     /// Non-negative and dimensionless or per length (metals' eta and k, scattering coefficients): translated like a
     /// reflectance, that is, averaged with the colour space's matching curves under its white, but not bounded by 1.
     Unbounded,
-}
-
-/// An sRGB-like triple seen as a reflectance: plain data, cheap enough to make at every texture look-up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RgbAlbedo {
-    /// The triple, clamped to [0, 1].
-    pub rgb: [f32; 3],
-    /// Its spectrum.
-    pub polynomial: SigmoidPolynomial,
-}
-
-impl RgbAlbedo {
-    /// The reflectance `rgb` of `space`, clamped to [0, 1].
-    #[inline]
-    pub fn new(rgb: [f32; 3], space: &ColorSpace) -> Self {
-        let rgb = rgb.map(|v| v.max(0.0).min(1.0));
-        Self { rgb, polynomial: space.uplift(rgb) }
-    }
-
-    /// The reflectance at each wavelength, in [0, 1].
-    #[inline]
-    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
-        match wavelengths.basis {
-            Basis::Spectral => self.polynomial.sample(wavelengths),
-            Basis::Rgb => lanes(self.rgb),
-        }
-    }
-}
-
-/// A triple of any non-negative size: `scale` times a reflectance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RgbUnbounded {
-    /// The triple.
-    pub rgb: [f32; 3],
-    /// Twice the largest component, as pbrt-v4.
-    pub scale: f32,
-    /// The spectrum of `rgb / scale`.
-    pub polynomial: SigmoidPolynomial,
-}
-
-impl RgbUnbounded {
-    /// The spectrum of `rgb` of `space`; negative components (and NaN) become 0.
-    #[inline]
-    pub fn new(rgb: [f32; 3], space: &ColorSpace) -> Self {
-        let rgb = rgb.map(|v| v.max(0.0));
-        let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
-        let polynomial = space.uplift(if scale > 0.0 { rgb.map(|v| v / scale) } else { [0.0; 3] });
-        Self { rgb, scale, polynomial }
-    }
-
-    /// The value at each wavelength.
-    #[inline]
-    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
-        match wavelengths.basis {
-            Basis::Spectral => self.polynomial.sample(wavelengths) * self.scale,
-            Basis::Rgb => lanes(self.rgb),
-        }
-    }
-}
-
-/// A triple seen as light: an unbounded colour times the colour space's illuminant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RgbIlluminant {
-    /// The colour without the illuminant.
-    pub color: RgbUnbounded,
-    /// Whose illuminant.
-    pub space: &'static ColorSpace,
-}
-
-impl RgbIlluminant {
-    /// Light that is `rgb` of `space`; (1, 1, 1) is the illuminant, with Y = 1.
-    #[inline]
-    pub fn new(rgb: [f32; 3], space: &'static ColorSpace) -> Self {
-        Self { color: RgbUnbounded::new(rgb, space), space }
-    }
-
-    /// The value at each wavelength, relative spectral radiance.
-    #[inline]
-    pub fn sample(&self, wavelengths: &Wavelengths) -> SampledSpectrum {
-        match wavelengths.basis {
-            Basis::Spectral => self.color.sample(wavelengths) * sample_dense(self.space.illuminant(), wavelengths),
-            Basis::Rgb => lanes(self.color.rgb),
-        }
-    }
-}
-
-#[inline]
-fn lanes(rgb: [f32; 3]) -> SampledSpectrum {
-    SampledSpectrum([rgb[0], rgb[1], rgb[2], rgb[1]])
-}
-
-/// The entry nearest to `lambda` nm, halves away from zero; 0 outside 359.5..830.5.
-#[inline]
-pub(crate) fn eval_dense(values: &[f32; DENSE_LENGTH], lambda: f32) -> f32 {
-    let index = lambda - (LAMBDA_MIN - 0.5);
-    // The saturating cast sends NaN and negatives to 0, hence the first condition.
-    let i = index as usize;
-    if index >= 0.0 && i < DENSE_LENGTH { values[i] } else { 0.0 }
-}
-
-/// [`eval_dense`] at each wavelength.
-#[inline]
-pub(crate) fn sample_dense(values: &[f32; DENSE_LENGTH], wavelengths: &Wavelengths) -> SampledSpectrum {
-    SampledSpectrum(wavelengths.lambda.map(|l| eval_dense(values, l)))
-}
-
-/// A table of (wavelength, value), increasing in wavelength, interpolated linearly; 0 outside.
-///
-/// Finding the segment costs one look-up by whole nanometre and rarely a step.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Table {
-    lambda: Box<[f32]>,
-    values: Box<[f32]>,
-    /// For each whole nm from 360: the last entry at or below it (0 if none).
-    segment: Box<[u16; DENSE_LENGTH]>,
-}
-
-impl Table {
-    /// From checked columns: equally long, increasing.
-    pub(crate) fn new(lambda: &[f32], values: &[f32]) -> Self {
-        let segment = std::array::from_fn(|i| {
-            let nm = LAMBDA_MIN + i as f32;
-            lambda.partition_point(|&l| l <= nm).saturating_sub(1).min(usize::from(u16::MAX)) as u16
-        });
-        Self { lambda: lambda.into(), values: values.into(), segment: Box::new(segment) }
-    }
-
-    /// The wavelengths, nm.
-    pub fn lambda(&self) -> &[f32] {
-        &self.lambda
-    }
-
-    /// The values at [`Table::lambda`].
-    pub fn values(&self) -> &[f32] {
-        &self.values
-    }
-
-    /// The interpolated value at `lambda` nm.
-    #[inline]
-    pub fn eval(&self, lambda: f32) -> f32 {
-        let (wavelengths, values) = (&*self.lambda, &*self.values);
-        let (Some(&first), Some(&last)) = (wavelengths.first(), wavelengths.last()) else { return 0.0 };
-        if !(first <= lambda && lambda <= last) {
-            return 0.0;
-        }
-        let mut i = if (LAMBDA_MIN..=LAMBDA_MAX).contains(&lambda) {
-            usize::from(self.segment[(lambda - LAMBDA_MIN) as usize])
-        } else {
-            wavelengths.partition_point(|&l| l <= lambda).saturating_sub(1)
-        };
-        while i + 1 < wavelengths.len() && wavelengths[i + 1] <= lambda {
-            i += 1;
-        }
-        if i + 1 >= wavelengths.len() {
-            return values[i];
-        }
-        let t = (lambda - wavelengths[i]) / (wavelengths[i + 1] - wavelengths[i]);
-        (1.0 - t) * values[i] + t * values[i + 1]
-    }
-}
-
-/// A black body, normalised to 1 at its peak, times `scale`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blackbody {
-    /// K.
-    pub temperature: f32,
-    /// What multiplies the normalised spectrum.
-    pub scale: f32,
-    /// Second radiation constant over temperature, nm.
-    c2_over_t: f32,
-    /// Makes the peak `scale`: (um)^5.
-    factor: f32,
-}
-
-impl Blackbody {
-    fn new(temperature: f32, scale: f32) -> Self {
-        let temperature = temperature.max(0.0);
-        let c2_over_t = 1.438_776_9e7 / f64::from(temperature);
-        // Wien: the peak lies where c2 / (lambda T) = 4.965114.
-        let peak = 2.897_772_1e-3 / f64::from(temperature) * 1e6;
-        let factor = f64::from(scale)
-            * peak.powi(5)
-            * (f64::from(crate::elementary::exp((c2_over_t / (peak * 1e3)) as f32)) - 1.0);
-        if temperature > 0.0 && factor.is_finite() {
-            Self { temperature, scale, c2_over_t: c2_over_t as f32, factor: factor as f32 }
-        } else {
-            Self { temperature, scale, c2_over_t: 0.0, factor: 0.0 }
-        }
-    }
-
-    #[inline]
-    fn eval(&self, lambda: f32) -> f32 {
-        if self.factor == 0.0 {
-            return 0.0;
-        }
-        let um = lambda * 1e-3;
-        let um2 = um * um;
-        self.factor / (um2 * um2 * um * (crate::elementary::exp(self.c2_over_t / lambda) - 1.0))
-    }
 }
 
 /// The forms a spectrum can have. Big tables are shared.
@@ -416,10 +219,7 @@ impl Spectrum {
         let curve = match &self.curve {
             Curve::Constant(c) => Curve::Constant(c * factor),
             Curve::Dense(v) => Curve::Dense(Arc::new(v.map(|v| v * factor))),
-            Curve::PiecewiseLinear(t) => {
-                let values: Vec<f32> = t.values.iter().map(|v| v * factor).collect();
-                Curve::PiecewiseLinear(Arc::new(Table { values: values.into(), ..(**t).clone() }))
-            }
+            Curve::PiecewiseLinear(t) => Curve::PiecewiseLinear(Arc::new(t.scaled(factor))),
             Curve::Blackbody(b) => Curve::Blackbody(Blackbody::new(b.temperature, b.scale * factor)),
             Curve::RgbAlbedo(s) => Curve::RgbUnbounded(RgbUnbounded {
                 rgb: s.rgb.map(|v| v * factor),
@@ -477,7 +277,7 @@ impl Spectrum {
         let spectral = match &self.curve {
             Curve::Constant(c) => *c,
             Curve::Dense(values) => largest(&values[..]),
-            Curve::PiecewiseLinear(table) => largest(&table.values),
+            Curve::PiecewiseLinear(table) => largest(table.values()),
             Curve::Blackbody(b) => b.scale,
             Curve::RgbAlbedo(s) => s.polynomial.max_value(),
             Curve::RgbUnbounded(s) => s.scale * s.polynomial.max_value(),
@@ -500,9 +300,9 @@ impl Spectrum {
             Curve::Constant(_) => true,
             Curve::Dense(v) => v.iter().all(|x| x == &v[0]),
             Curve::PiecewiseLinear(t) => {
-                t.values.iter().all(|x| x == &t.values[0])
-                    && t.eval(LAMBDA_MIN) == t.values[0]
-                    && t.eval(LAMBDA_MAX) == t.values[0]
+                t.values().iter().all(|x| x == &t.values()[0])
+                    && t.eval(LAMBDA_MIN) == t.values()[0]
+                    && t.eval(LAMBDA_MAX) == t.values()[0]
             }
             Curve::RgbAlbedo(s) => s.polynomial.is_constant(),
             Curve::RgbUnbounded(s) => s.polynomial.is_constant(),
@@ -528,38 +328,10 @@ fn rgb_of(f: impl Fn(f32) -> f32, role: Role, space: &ColorSpace) -> [f32; 3] {
     matrix::apply(&space.rgb_from_xyz_exact, xyz).map(|v| v.max(0.0) as f32)
 }
 
-/// The daylight of correlated colour temperature `temperature` K, normalised like pbrt-v4's: a CIE D series
-/// spectrum above 4000 K, below it a black body of unit luminance. 0.01 of the D series' usual scale.
-pub fn daylight(temperature: f32, space: &'static ColorSpace) -> Spectrum {
-    use crate::data::illuminants::{S0, S1, S2};
-    // c2 was revised from 1.4380 to 1.4388 cm K after the D series was named.
-    let cct = f64::from(temperature) * 1.4388 / 1.4380;
-    if cct < 4000.0 {
-        let black = Spectrum::blackbody(cct as f32, Role::Illuminant, space).to_dense();
-        let y = crate::spectrum_to_photometric(&black);
-        return if y > 0.0 { black.scaled(CIE_Y_INTEGRAL / y) } else { black };
-    }
-    // CIE 15:2004, equations 3.3 to 3.5.
-    let x = if cct <= 7000.0 {
-        -4.607e9 / (cct * cct * cct) + 2.9678e6 / (cct * cct) + 0.09911e3 / cct + 0.244_063
-    } else {
-        -2.0064e9 / (cct * cct * cct) + 1.9018e6 / (cct * cct) + 0.24748e3 / cct + 0.23704
-    };
-    let y = -3.0 * x * x + 2.87 * x - 0.275;
-    let m = 0.0241 + 0.2562 * x - 0.7341 * y;
-    let m1 = (-1.3515 - 1.7703 * x + 5.9114 * y) / m;
-    let m2 = (0.03 - 31.4424 * x + 30.0717 * y) / m;
-    let lambda: Vec<f32> = (0..S0.len()).map(|i| 300.0 + 5.0 * i as f32).collect();
-    let values: Vec<f32> = (0..S0.len())
-        .map(|i| ((f64::from(S0[i]) + f64::from(S1[i]) * m1 + f64::from(S2[i]) * m2) * 0.01) as f32)
-        .collect();
-    Spectrum::from_table(Table::new(&lambda, &values), Role::Illuminant, space).to_dense()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Sensor, named, spectrum_to_photometric, spectrum_to_xyz};
+    use crate::{CIE_Y_INTEGRAL, Sensor, named, spectrum_to_photometric, spectrum_to_xyz};
 
     fn srgb() -> &'static ColorSpace {
         ColorSpace::srgb()
@@ -595,49 +367,6 @@ mod tests {
     }
 
     #[test]
-    fn tables_interpolate_at_knots_between_and_outside() {
-        let s = Spectrum::interleaved(
-            &[350.0, 3.0, 400.0, 0.2, 500.5, 0.8, 500.75, 0.4, 900.0, 0.5],
-            Role::Unbounded,
-            srgb(),
-        )
-        .unwrap();
-        for (l, v) in [
-            (349.0, 0.0),
-            (350.0, 3.0),
-            (375.0, 1.6),
-            (400.0, 0.2),
-            (450.25, 0.5),
-            (500.5, 0.8),
-            (500.625, 0.6),
-            (900.0, 0.5),
-            (901.0, 0.0),
-        ] {
-            assert!((s.eval(l) - v).abs() < 1e-5, "{l}: {}", s.eval(l));
-        }
-        assert_eq!(s.eval(f32::NAN), 0.0);
-        let single = Spectrum::interleaved(&[500.0, 2.0], Role::Unbounded, srgb()).unwrap();
-        assert_eq!((single.eval(500.0), single.eval(501.0)), (2.0, 0.0));
-    }
-
-    #[test]
-    fn dense_tables_are_read_at_the_nearest_nanometre() {
-        let s = Spectrum::dense_from_fn(|l| l, Role::Unbounded, srgb());
-        for (l, v) in [
-            (359.4, 0.0),
-            (359.6, 360.0),
-            (360.0, 360.0),
-            (500.49, 500.0),
-            (500.5, 501.0),
-            (830.4, 830.0),
-            (830.6, 0.0),
-        ] {
-            assert_eq!(s.eval(l), v, "{l}");
-        }
-        assert_eq!((s.eval(f32::NAN), s.eval(f32::NEG_INFINITY), s.eval(f32::INFINITY)), (0.0, 0.0, 0.0));
-    }
-
-    #[test]
     fn bad_tables_say_what_is_wrong() {
         let make = |l: &[f32], v: &[f32]| Spectrum::piecewise_linear(l, v, Role::Unbounded, srgb()).err();
         assert_eq!(make(&[], &[]), Some(SpectrumError::Empty));
@@ -649,19 +378,6 @@ mod tests {
             Spectrum::interleaved(&[400.0], Role::Unbounded, srgb()).err(),
             Some(SpectrumError::LengthMismatch(1, 0))
         );
-    }
-
-    #[test]
-    fn blackbodies_peak_at_one_and_follow_planck() {
-        let s = Spectrum::blackbody(5000.0, Role::Illuminant, srgb());
-        assert!((s.eval(579.55) - 1.0).abs() < 1e-5);
-        for l in [400.0f64, 800.0] {
-            let planck = crate::blackbody(l, 5000.0) / crate::blackbody(579.554_42, 5000.0);
-            assert!((f64::from(s.eval(l as f32)) / planck - 1.0).abs() < 1e-4, "{l}");
-        }
-        assert_eq!(Spectrum::blackbody(0.0, Role::Illuminant, srgb()).eval(500.0), 0.0);
-        assert_eq!(Spectrum::blackbody(-5.0, Role::Illuminant, srgb()).eval(500.0), 0.0);
-        assert!(Spectrum::blackbody(100.0, Role::Illuminant, srgb()).eval(400.0).is_finite());
     }
 
     #[test]
@@ -735,21 +451,6 @@ mod tests {
         assert!(flat([300.0, 900.0]).is_constant() && !flat([400.0, 900.0]).is_constant());
         assert!(Spectrum::rgb_albedo([0.3; 3], srgb()).is_constant());
         assert!(!Spectrum::rgb_albedo([0.3, 0.3, 0.4], srgb()).is_constant());
-    }
-
-    // D65 at 5003 and 6504 K within the rounding of the published tables.
-    #[test]
-    fn daylight_is_the_d_series() {
-        let d65 = named("stdillum-D65").unwrap();
-        let made = daylight(6500.0, srgb());
-        for l in (360..=830).step_by(10) {
-            let (a, b) = (d65.eval(l as f32) / d65.eval(560.0), made.eval(l as f32));
-            assert!((a - b).abs() < 3e-3, "{l}: {a} {b}");
-        }
-        let cool = spectrum_to_xyz(&daylight(10_000.0, srgb()));
-        assert!((cool[0] / cool.iter().sum::<f64>() - 0.2788).abs() < 1e-3);
-        let warm = spectrum_to_xyz(&daylight(2856.0, srgb()));
-        assert!((warm[1] - 1.0).abs() < 1e-4 && (warm[0] / warm.iter().sum::<f64>() - 0.4476).abs() < 2e-3);
     }
 
     // A Monte Carlo estimate by the path of a render: 20,000 fixed stratified draws. Its error is below 2e-4,

@@ -60,8 +60,9 @@ impl SigmoidPolynomial {
 /// Grid points along each axis.
 const RESOLUTION: usize = 64;
 
-/// Coefficients for one largest component and one pair of ratios, along the largest component's value.
-type Column = [[f32; 3]; RESOLUTION];
+/// Coefficients for one largest component and one pair of ratios, along the largest component's value;
+/// padded so that three are read as one.
+type Column = [[f32; 4]; RESOLUTION];
 
 /// The colour spaces for which fits are defined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +80,8 @@ pub(crate) struct Columns {
     columns: Box<[OnceLock<Box<Column>>]>,
     /// Value of the largest component at each grid point.
     scale: [f32; RESOLUTION],
+    /// For each 256th of the unit interval, the last grid point below its start: where to begin to look.
+    below: [u8; 257],
 }
 
 impl std::fmt::Debug for Columns {
@@ -94,6 +97,10 @@ impl Columns {
             fit: OnceLock::new(),
             columns: (0..3 * RESOLUTION * RESOLUTION).map(|_| OnceLock::new()).collect(),
             scale: std::array::from_fn(grid_value),
+            below: std::array::from_fn(|i| {
+                let start = i as f32 / 256.0;
+                (0..RESOLUTION).rev().find(|&k| grid_value(k) < start).unwrap_or(0) as u8
+            }),
         }
     }
 
@@ -128,7 +135,10 @@ impl Columns {
         let y = rgb[(largest + 2) % 3] * per_unit;
         let last = RESOLUTION - 2;
         let (xi, yi) = ((x as usize).min(last), (y as usize).min(last));
-        let zi = self.scale.partition_point(|&s| s < z).saturating_sub(1).min(last);
+        let mut zi = usize::from(self.below[(z * 256.0) as usize]).min(last);
+        while zi < last && self.scale[zi + 1] < z {
+            zi += 1;
+        }
         let (x1, y1) = (x - xi as f32, y - yi as f32);
         let z1 = (z - self.scale[zi]) / (self.scale[zi + 1] - self.scale[zi]);
         let (x0, y0, z0) = (1.0 - x1, 1.0 - y1, 1.0 - z1);
@@ -136,10 +146,11 @@ impl Columns {
         let c01 = self.column(largest, yi, xi + 1);
         let c10 = self.column(largest, yi + 1, xi);
         let c11 = self.column(largest, yi + 1, xi + 1);
-        let coefficients = std::array::from_fn(|j| {
-            let plane = |z: usize| (c00[z][j] * x0 + c01[z][j] * x1) * y0 + (c10[z][j] * x0 + c11[z][j] * x1) * y1;
-            plane(zi) * z0 + plane(zi + 1) * z1
-        });
+        let plane = |z: usize| -> [f32; 4] {
+            std::array::from_fn(|j| (c00[z][j] * x0 + c01[z][j] * x1) * y0 + (c10[z][j] * x0 + c11[z][j] * x1) * y1)
+        };
+        let (near, far) = (plane(zi), plane(zi + 1));
+        let coefficients = std::array::from_fn(|j| near[j] * z0 + far[j] * z1);
         SigmoidPolynomial { coefficients }
     }
 }
@@ -269,7 +280,7 @@ impl Fit {
     /// The 64 fits along one column, from a fifth of the way up and then down, each starting at its neighbour.
     fn column(&self, largest: usize, y: usize, x: usize) -> Box<Column> {
         let ratio = |i: usize| i as f64 / (RESOLUTION - 1) as f64;
-        let mut column = Box::new([[0.0f32; 3]; RESOLUTION]);
+        let mut column = Box::new([[0.0f32; 4]; RESOLUTION]);
         let start = RESOLUTION / 5;
         let mut solve = |range: &mut dyn Iterator<Item = usize>| {
             let mut c = [0.0; 3];
@@ -287,6 +298,7 @@ impl Fit {
                     (a * per * per) as f32,
                     (b * per - 2.0 * a * from * per * per) as f32,
                     (d - b * from * per + a * (from * per) * (from * per)) as f32,
+                    0.0,
                 ];
             }
         };

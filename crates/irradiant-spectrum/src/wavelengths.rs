@@ -61,7 +61,7 @@ impl Wavelengths {
                 rotated -= 1.0;
             }
             // Rounding may step a hair outside the range, where the pdf would be 0.
-            lambda[i] = sample_visible_wavelength(rotated).max(LAMBDA_MIN).min(LAMBDA_MAX);
+            lambda[i] = sample_visible_wavelength(rotated).clamp(LAMBDA_MIN, LAMBDA_MAX);
             pdf[i] = visible_wavelength_pdf(lambda[i]);
         }
         Self { lambda, pdf, basis: Basis::Spectral }

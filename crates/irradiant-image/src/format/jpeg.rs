@@ -1,20 +1,46 @@
-//! JPEG, both ways, through the `image` crate.
+//! JPEG: in through `jpeg-decoder`, out through the `image` crate.
 
 use std::io::Cursor;
 
-use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
+use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageDecoder};
+use jpeg_decoder::{Decoder, Error, PixelFormat};
 
 use crate::error::ImageError;
 use crate::format::{ReadOptions, TRANSFORM_RATIO, codes_for_display, guarded};
 use crate::image::Image;
 
 /// Reads a JPEG file: Y or R, G, B in 8 bits, sRGB unless the options say otherwise.
+///
+/// Four inks (CMYK, YCCK) become R, G, B by multiplication of ink and black, as in stb_image.
 pub fn read_jpeg(bytes: &[u8], options: &ReadOptions) -> Result<Image, ImageError> {
     guarded("JPEG", || {
-        let decoder =
-            JpegDecoder::new(Cursor::new(bytes)).map_err(|error| ImageError::invalid(format!("JPEG: {error}")))?;
-        decode_u8(decoder, bytes.len(), TRANSFORM_RATIO, options)
+        let invalid = |error: Error| match error {
+            Error::Unsupported(what) => ImageError::unsupported(format!("JPEG: {what:?}")),
+            other => ImageError::invalid(format!("JPEG: {other}")),
+        };
+        let mut decoder = Decoder::new(Cursor::new(bytes));
+        decoder.set_max_decoding_buffer_size(usize::try_from(options.max_bytes).unwrap_or(usize::MAX));
+        decoder.read_info().map_err(invalid)?;
+        let Some(info) = decoder.info() else { return Err(ImageError::invalid("JPEG: there is no frame")) };
+        let (names, stored): (&[&str], u64) = match info.pixel_format {
+            PixelFormat::L8 => (&["Y"], 1),
+            PixelFormat::RGB24 => (&["R", "G", "B"], 3),
+            PixelFormat::CMYK32 => (&["R", "G", "B"], 4),
+            PixelFormat::L16 => return Err(ImageError::unsupported("JPEG of 16 bits")),
+        };
+        let size = [info.width.into(), info.height.into(), stored];
+        let count = options.budget(size, 1, bytes.len(), TRANSFORM_RATIO)?;
+        let mut codes = decoder.decode().map_err(invalid)?;
+        if codes.len() != count {
+            return Err(ImageError::invalid("JPEG: the rows do not fill the picture"));
+        }
+        if stored == 4 {
+            let times = |ink: u8, black: u8| ((u32::from(ink) * u32::from(black) + 127) / 255) as u8;
+            codes =
+                codes.chunks_exact(4).flat_map(|inks| [0, 1, 2].map(|i| times(255 - inks[i], 255 - inks[3]))).collect();
+        }
+        Image::from_u8(info.width.into(), info.height.into(), names, codes, options.encoding())
     })
 }
 

@@ -10,7 +10,7 @@
 //! | PNG, EXR (none, RLE, ZIP) | 1,100 before palettes and low bit depths are widened |
 //! | JPEG, EXR (PIZ, PXR24, B44, DWA) | 65,536 |
 //!
-//! plus 64 KiB. The third-party decoders (`exr`, `png`, `image` for JPEG and BMP) run inside
+//! plus 64 KiB. The third-party decoders (`exr`, `png`, `jpeg-decoder`, `image` for BMP) run inside
 //! `catch_unwind`, since a decoder that panics on a hostile file must not take the renderer along.
 
 pub mod bmp;

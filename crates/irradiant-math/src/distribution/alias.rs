@@ -42,9 +42,8 @@ impl AliasTable {
         }
         // Scaled so that the mean is 1; shares below 1 are topped up by those above.
         let mut share: Vec<f64> = weights.iter().map(|w| weight(*w) / total * n as f64).collect();
-        let mut bins: Vec<Bin> = (0..n)
-            .map(|i| Bin { stay: 1.0, alias: i as u32, pmf: (share[i] / n as f64) as f32 })
-            .collect();
+        let mut bins: Vec<Bin> =
+            (0..n).map(|i| Bin { stay: 1.0, alias: i as u32, pmf: (share[i] / n as f64) as f32 }).collect();
         let (mut poor, mut rich): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| share[*i] < 1.0);
         while let (Some(p), Some(&r)) = (poor.pop(), rich.last()) {
             bins[p].stay = share[p] as f32;

@@ -234,11 +234,7 @@ impl PiecewiseConstant2D {
             (x as f32 + place_in_cell(cdf, x, u.x)) / self.nx as f32,
             (y as f32 + place_in_cell(&self.marginal, y, u.y)) / self.ny as f32,
         );
-        Sample2D {
-            p: self.domain.lerp(t),
-            pdf: self.values[y * self.nx + x] * self.normalisation,
-            offset: [x, y],
-        }
+        Sample2D { p: self.domain.lerp(t), pdf: self.values[y * self.nx + x] * self.normalisation, offset: [x, y] }
     }
 
     /// The fractional grid position of `p`, as cell and remainder; `None` outside.
@@ -283,8 +279,13 @@ mod tests {
         assert!((d.integral() - 3.0).abs() < 1e-6);
         let mut rng = Rng::new(3);
         // 1e-6 false alarms; a pdf 5 % off over half of the range gives p < 1e-8.
-        let report =
-            Chi2::new(50_000).line(-1.0, 2.0, 60, |x| d.pdf(x as f32) as f64, || Some(d.sample(rng.next_f32()).x as f64));
+        let report = Chi2::new(50_000).line(
+            -1.0,
+            2.0,
+            60,
+            |x| d.pdf(x as f32) as f64,
+            || Some(d.sample(rng.next_f32()).x as f64),
+        );
         assert!(report.p_value > 1e-6, "{report:?}");
         for i in 0..1000 {
             let u = i as f32 / 1000.0;
@@ -329,10 +330,16 @@ mod tests {
         let domain = Bounds2::new(Point2::new(-1.0, 2.0), Point2::new(3.0, 5.0));
         let d = PiecewiseConstant2D::over(values, 8, 5, domain).unwrap();
         let mut rng = Rng::new(9);
-        let report = Chi2::new(100_000).grid([-1.0, 2.0], [3.0, 5.0], [16, 15], |x, y| d.pdf(Point2::new(x as f32, y as f32)) as f64, || {
-            let p = d.sample(Point2::new(rng.next_f32(), rng.next_f32())).p;
-            Some([p.x as f64, p.y as f64])
-        });
+        let report = Chi2::new(100_000).grid(
+            [-1.0, 2.0],
+            [3.0, 5.0],
+            [16, 15],
+            |x, y| d.pdf(Point2::new(x as f32, y as f32)) as f64,
+            || {
+                let p = d.sample(Point2::new(rng.next_f32(), rng.next_f32())).p;
+                Some([p.x as f64, p.y as f64])
+            },
+        );
         assert!(report.p_value > 1e-6, "{report:?}");
         for i in 0..64 {
             for j in 0..64 {

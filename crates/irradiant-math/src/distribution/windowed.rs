@@ -114,10 +114,7 @@ impl WindowedPiecewiseConstant2D {
             return None;
         }
         let y = invert(y0, y1, t.ny, u.y as f64 * conditional, |y| t.integral_of(c0, c1, y0, y));
-        let p = Point2::new(
-            (x as f32).clamp(window.min.x, window.max.x),
-            (y as f32).clamp(window.min.y, window.max.y),
-        );
+        let p = Point2::new((x as f32).clamp(window.min.x, window.max.x), (y as f32).clamp(window.min.y, window.max.y));
         let pdf = (self.value(p) as f64 / total) as f32;
         (pdf > 0.0).then_some(WindowSample { p, pdf })
     }
@@ -165,7 +162,8 @@ mod tests {
         let t = SummedAreaTable::new(&values, nx, ny).unwrap();
         let mut rng = Rng::new(4);
         for _ in 0..200 {
-            let b = Bounds2::new(Point2::new(rng.next_f32(), rng.next_f32()), Point2::new(rng.next_f32(), rng.next_f32()));
+            let b =
+                Bounds2::new(Point2::new(rng.next_f32(), rng.next_f32()), Point2::new(rng.next_f32(), rng.next_f32()));
             let mut brute = 0.0;
             for y in 0..ny {
                 for x in 0..nx {
@@ -173,7 +171,8 @@ mod tests {
                         let (c0, c1) = (i as f64 / n as f64, (i + 1) as f64 / n as f64);
                         (c1.min(b as f64) - c0.max(a as f64)).max(0.0)
                     };
-                    brute += values[y * nx + x] as f64 * overlap(x, nx, b.min.x, b.max.x) * overlap(y, ny, b.min.y, b.max.y);
+                    brute +=
+                        values[y * nx + x] as f64 * overlap(x, nx, b.min.x, b.max.x) * overlap(y, ny, b.min.y, b.max.y);
                 }
             }
             assert!((t.integral(&b) - brute).abs() < 1e-12, "{b:?}");
@@ -184,7 +183,12 @@ mod tests {
     fn windows_are_drawn_from_what_they_show() {
         let d = WindowedPiecewiseConstant2D::new(grid(9, 6), 9, 6).unwrap();
         let mut rng = Rng::new(8);
-        for (a, b) in [((0.0, 0.0), (1.0, 1.0)), ((0.13, 0.2), (0.71, 0.93)), ((0.3, 0.4), (0.32, 0.45)), ((0.0, 0.5), (0.2, 1.0))] {
+        for (a, b) in [
+            ((0.0, 0.0), (1.0, 1.0)),
+            ((0.13, 0.2), (0.71, 0.93)),
+            ((0.3, 0.4), (0.32, 0.45)),
+            ((0.0, 0.5), (0.2, 1.0)),
+        ] {
             let w = Bounds2::new(Point2::new(a.0, a.1), Point2::new(b.0, b.1));
             // 1e-6 false alarms; 5 % off over half of the window gives p < 1e-10.
             let report = Chi2::new(60_000).grid(

@@ -34,8 +34,7 @@ pub fn uniform_disk_concentric(u: Point2) -> Point2 {
     if x == 0.0 && y == 0.0 {
         return Point2::ZERO;
     }
-    let (r, theta) =
-        if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_2 - FRAC_PI_4 * (x / y)) };
+    let (r, theta) = if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_2 - FRAC_PI_4 * (x / y)) };
     let (s, c) = sin_cos(theta);
     Point2::new(r * c, r * s)
 }
@@ -123,14 +122,26 @@ mod tests {
     use super::*;
     use irradiant_testkit::{Chi2, Rng};
 
-    fn check(name: &str, low: f64, draw: impl Fn(Point2) -> Point2, pdf: impl Fn(Point2) -> f32, inverse: impl Fn(Point2) -> Point2) {
+    fn check(
+        name: &str,
+        low: f64,
+        draw: impl Fn(Point2) -> Point2,
+        pdf: impl Fn(Point2) -> f32,
+        inverse: impl Fn(Point2) -> Point2,
+    ) {
         // 1e-6 false alarms; 100,000 samples in 400 cells: a density wrong by 5 % over half the domain gives a
         // chi-square near 650, p < 1e-13.
         let mut rng = Rng::new(17);
-        let report = Chi2::new(100_000).grid([low, low], [1.0, 1.0], [20, 20], |x, y| pdf(Point2::new(x as f32, y as f32)) as f64, || {
-            let p = draw(Point2::new(rng.next_f32(), rng.next_f32()));
-            Some([p.x as f64, p.y as f64])
-        });
+        let report = Chi2::new(100_000).grid(
+            [low, low],
+            [1.0, 1.0],
+            [20, 20],
+            |x, y| pdf(Point2::new(x as f32, y as f32)) as f64,
+            || {
+                let p = draw(Point2::new(rng.next_f32(), rng.next_f32()));
+                Some([p.x as f64, p.y as f64])
+            },
+        );
         assert!(report.p_value > 1e-6, "{name}: {report:?}");
         for i in 1..64 {
             for j in 1..64 {

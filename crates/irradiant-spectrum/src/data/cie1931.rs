@@ -4,6 +4,7 @@
 //! Source: CIE 018:2019 table 6, through colour-science; equal to pbrt-v4's CIE_X, CIE_Y, CIE_Z.
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
+#![allow(clippy::approx_constant)]
 
 /// x-bar.
 pub(crate) static X: [f32; 471] = [

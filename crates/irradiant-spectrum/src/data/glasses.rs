@@ -4,6 +4,7 @@
 //! Source: Schott's Sellmeier coefficients, as on refractiveindex.info (CC0).
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
+#![allow(clippy::approx_constant)]
 
 /// BK7: nm.
 pub(crate) static BK7_LAMBDA: [f32; 29] = [

@@ -4,6 +4,7 @@
 //! Sources: CIE 15:2004 tables T.1, T.2, T.6 through colour-science; the script names what is pbrt-v4's.
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
+#![allow(clippy::approx_constant)]
 
 /// A: 300 nm and on, 5 nm steps.
 pub(crate) static A: [f32; 107] = [

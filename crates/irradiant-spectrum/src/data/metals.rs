@@ -4,6 +4,7 @@
 //! Source: luxpop.com tables, as in Mitsuba 3's `data/ior` and pbrt-v4. Brass (CuZn): Querry 1985, CRDC-CR-85034.
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
+#![allow(clippy::approx_constant)]
 
 /// Ag: nm.
 pub(crate) static AG_LAMBDA: [f32; 56] = [

@@ -11,7 +11,8 @@ pub(crate) mod swatches;
 
 use crate::ColorSpace;
 use crate::photometry::{CIE_Y_INTEGRAL, DENSE_LENGTH};
-use crate::stored::{Role, Spectrum, Table};
+use crate::stored::{Role, Spectrum};
+use crate::table::Table;
 use std::sync::{Arc, LazyLock};
 
 /// One named table and how to read it.
@@ -188,6 +189,22 @@ mod tests {
         }
         assert!(named("stdillum-D66").is_none() && named("nikon_d850").is_none() && named("").is_none());
         assert_eq!(all.iter().collect::<std::collections::BTreeSet<_>>().len(), all.len(), "a name twice");
+    }
+
+    // The responses are typed by hand: a digit lost or doubled makes a step of 2.3 in the logarithm.
+    #[test]
+    fn camera_responses_are_smooth() {
+        for (name, camera) in &sensors::CAMERAS {
+            assert_eq!(camera[1].iter().max(), Some(&100_000), "{name}");
+            for (curve, channel) in camera.iter().zip(SUFFIXES) {
+                // 430 to 690 nm; the ultraviolet edge is steep.
+                for i in 5..32 {
+                    let [before, at, after] = [curve[i - 1], curve[i], curve[i + 1]].map(|v| f64::from(v).ln());
+                    let kink = (at - (before + after) / 2.0).abs();
+                    assert!(kink < 0.85, "{name}{channel} at {} nm: {kink}", 380 + 10 * i);
+                }
+            }
+        }
     }
 
     #[test]

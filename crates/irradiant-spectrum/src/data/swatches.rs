@@ -2,6 +2,7 @@
 //! Average of 30 ColorChecker charts by D. Pascale, BabelColor (2012), through colour-science; the same as pbrt-v4's.
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
+#![allow(clippy::approx_constant)]
 
 /// Reflectance of the 24 patches, 380..=730 nm in 10 nm steps.
 pub(crate) static SWATCHES: [[f32; 36]; 24] = [

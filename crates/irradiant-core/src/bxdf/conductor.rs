@@ -1,0 +1,89 @@
+//! Metals: mirror reflection weighted by the complex Fresnel reflectance, off a smooth or a rough surface.
+//!
+//! Torrance and Sparrow 1967 with GGX facets; single scattering, so rough metals lose some energy (as pbrt-v4's do).
+
+use super::fresnel::fresnel_conductor;
+use super::microfacet::Ggx;
+use super::{BsdfSample, Lobe, Sides};
+use irradiant_math::{Point2, Vec3};
+use irradiant_spectrum::SampledSpectrum;
+
+/// A metal. Two-sided.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conductor {
+    eta: SampledSpectrum,
+    k: SampledSpectrum,
+    pub(super) facets: Ggx,
+}
+
+/// The rough or smooth mirror lobe shared by all opaque mirrors: `fresnel(cos)` of the facet angle times GGX.
+#[inline]
+pub(super) fn mirror_f_and_pdf(
+    facets: &Ggx,
+    wo: Vec3,
+    wi: Vec3,
+    fresnel: impl FnOnce(f32) -> SampledSpectrum,
+) -> (SampledSpectrum, f32) {
+    if wo.z * wi.z <= 0.0 || facets.is_smooth() {
+        return (SampledSpectrum::ZERO, 0.0);
+    }
+    let h = wo + wi;
+    let length_squared = h.length_squared();
+    if length_squared == 0.0 {
+        return (SampledSpectrum::ZERO, 0.0);
+    }
+    let m = h / length_squared.sqrt();
+    let f = fresnel(wo.dot(m).abs()) * facets.reflection(wo, wi, m);
+    (f, facets.bounded_pdf(wo, m))
+}
+
+/// A sample of [`mirror_f_and_pdf`]; a delta in the mirror direction when smooth.
+#[inline]
+pub(super) fn mirror_sample(
+    facets: &Ggx,
+    wo: Vec3,
+    u: Point2,
+    sides: Sides,
+    fresnel: impl FnOnce(f32) -> SampledSpectrum,
+) -> Option<BsdfSample> {
+    if !sides.reflection() {
+        return None;
+    }
+    if facets.is_smooth() {
+        let wi = Vec3::new(-wo.x, -wo.y, wo.z);
+        let cos = wo.z.abs();
+        return Some(BsdfSample::new(fresnel(cos) / cos, wi, 1.0, Lobe::SPECULAR_REFLECTION));
+    }
+    let wi = facets.sample_bounded_reflection(wo, u)?;
+    let (f, pdf) = mirror_f_and_pdf(facets, wo, wi, fresnel);
+    Some(BsdfSample::new(f, wi, pdf, Lobe::GLOSSY_REFLECTION))
+}
+
+impl Conductor {
+    /// A metal of index `eta + i k` relative to the outside, with GGX facets.
+    #[inline]
+    pub fn new(eta: SampledSpectrum, k: SampledSpectrum, facets: Ggx) -> Self {
+        Self { eta, k, facets }
+    }
+
+    /// The fraction reflected by a facet at this angle, per lane.
+    #[inline]
+    pub fn fresnel(&self, cos_i: f32) -> SampledSpectrum {
+        fresnel_conductor(cos_i, self.eta, self.k)
+    }
+
+    #[inline]
+    pub(super) fn flags(&self) -> Lobe {
+        if self.facets.is_smooth() { Lobe::SPECULAR_REFLECTION } else { Lobe::GLOSSY_REFLECTION }
+    }
+
+    #[inline]
+    pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (SampledSpectrum, f32) {
+        mirror_f_and_pdf(&self.facets, wo, wi, |cos| self.fresnel(cos))
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, wo: Vec3, u: Point2, sides: Sides) -> Option<BsdfSample> {
+        mirror_sample(&self.facets, wo, u, sides, |cos| self.fresnel(cos))
+    }
+}

@@ -1,0 +1,281 @@
+//! Groups of shapes, their trees, and what a tree asks back: user primitives, instances, alpha.
+//!
+//! One group holds what stands in the scene itself; one more each object and each moving shape. A group's tree holds the
+//! triangles of all its meshes directly; quadrics, patches, pieces of curves and instances are user primitives. An
+//! instance takes the ray to its group's space and asks that group's tree.
+
+use super::curve::{Curve, CurveHit};
+use super::cylinder::Cylinder;
+use super::disk::Disk;
+use super::instance::Instance;
+use super::sphere::Sphere;
+use super::triangle::Mesh;
+use super::{AlphaTextures, Geometry, Hit, NO_INSTANCE, bilinear};
+use crate::interaction::{MaterialId, TextureContext};
+use irradiant_bvh as bvh;
+use irradiant_math::{Point2, Point3, Ray, Vec3, hash};
+use irradiant_scene::desc::FloatTextureRef;
+
+/// How much of a surface is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Alpha {
+    /// All of it.
+    Opaque,
+    /// This share of it, in [0, 1).
+    Constant(f32),
+    /// As a texture says.
+    Texture(FloatTextureRef),
+}
+
+/// What all primitives of a shape have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShapeInfo {
+    pub material: MaterialId,
+    pub alpha: Alpha,
+    /// Index of the emitter of its first face, or [`NO_EMITTER`].
+    pub first_emitter: u32,
+}
+
+pub(crate) const NO_EMITTER: u32 = u32::MAX;
+
+/// A primitive that the tree knows only by its box. Indices into the vectors of [`Geometry`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum User {
+    Sphere { shape: u32, sphere: u32 },
+    Disk { shape: u32, disk: u32 },
+    Cylinder { shape: u32, cylinder: u32 },
+    Patch { mesh: u32, quad: u32 },
+    Curve { shape: u32, curve: u32, piece: u32 },
+    Instance(u32),
+}
+
+/// Consecutive triangles of a tree that belong to one mesh.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeshRange {
+    pub first: u32,
+    pub mesh: u32,
+}
+
+/// A tree and what its primitives are.
+#[derive(Debug)]
+pub(crate) struct Group {
+    pub tree: bvh::Bvh,
+    pub ranges: Vec<MeshRange>,
+    pub users: Vec<User>,
+}
+
+impl Group {
+    /// The mesh of a triangle of the tree, and its index there.
+    #[inline]
+    pub fn triangle(&self, primitive: u32) -> (u32, u32) {
+        let i = self.ranges.partition_point(|r| r.first <= primitive) - 1;
+        let range = self.ranges[i];
+        (range.mesh, primitive - range.first)
+    }
+}
+
+/// The shapes themselves.
+#[derive(Debug, Default)]
+pub(crate) struct Shapes {
+    pub infos: Vec<ShapeInfo>,
+    pub meshes: Vec<Mesh>,
+    /// The shape that each mesh is.
+    pub mesh_shapes: Vec<u32>,
+    pub spheres: Vec<Sphere>,
+    pub disks: Vec<Disk>,
+    pub cylinders: Vec<Cylinder>,
+    pub curves: Vec<Curve>,
+    pub instances: Vec<Instance>,
+}
+
+/// Answers a tree's questions about one group.
+pub(crate) struct GroupLeaves<'a, A> {
+    pub geometry: &'a Geometry,
+    pub group: &'a Group,
+    pub alpha: &'a A,
+}
+
+#[inline]
+pub(crate) fn to_ray(ray: &bvh::Ray) -> Ray {
+    Ray::new(ray.o.into(), ray.d.into(), ray.time)
+}
+
+#[inline]
+pub(crate) fn to_tree(ray: &Ray, t_max: f32) -> bvh::Ray {
+    bvh::Ray { o: ray.o.to_array(), t_max, d: ray.d.to_array(), time: ray.time }
+}
+
+/// Whether a surface of this opacity is there for a ray: a fixed pseudo-random choice, by pbrt's rule the same for all
+/// surfaces that one ray meets.
+#[inline]
+fn is_there(alpha: f32, o: Point3, d: Vec3) -> bool {
+    if alpha >= 1.0 {
+        true
+    } else if alpha > 0.0 {
+        hash::unit_f32_from_hash(hash::hash_ray(o, d)) < alpha
+    } else {
+        false
+    }
+}
+
+impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
+    type UserHit = Hit;
+    const HAS_FILTER: bool = true;
+
+    fn intersect(&self, user: u32, ray: &bvh::Ray) -> Option<(f32, Hit)> {
+        self.meet(user, ray)
+    }
+
+    fn occluded(&self, user: u32, ray: &bvh::Ray) -> bool {
+        match self.group.users[user as usize] {
+            User::Instance(i) => {
+                let instance = &self.geometry.shapes.instances[i as usize];
+                let local = instance.ray_to_group(ray);
+                let group = &self.geometry.groups[instance.group as usize];
+                group.tree.occluded(self.geometry.level, &local, &GroupLeaves { group, ..*self })
+            }
+            _ => self.meet(user, ray).is_some(),
+        }
+    }
+
+    fn accept(&self, triangle: u32, ray: &bvh::Ray, _t: f32, u: f32, v: f32) -> bool {
+        let shapes = &self.geometry.shapes;
+        let (mesh_index, index) = self.group.triangle(triangle);
+        let alpha = match shapes.infos[shapes.mesh_shapes[mesh_index as usize] as usize].alpha {
+            Alpha::Opaque => return true,
+            Alpha::Constant(a) => a,
+            Alpha::Texture(texture) => {
+                let mesh = &shapes.meshes[mesh_index as usize];
+                let [p0, p1, p2] = mesh.triangles[index as usize].map(|i| mesh.position(i));
+                let context = context(
+                    mesh.triangle_point(index, u, v).0,
+                    (p1 - p0).cross(p2 - p0),
+                    mesh.triangle_uv(index, u, v),
+                    mesh.face(index as usize),
+                );
+                self.alpha.alpha(texture, &context)
+            }
+        };
+        is_there(alpha, ray.o.into(), ray.d.into())
+    }
+}
+
+fn context(p: Point3, n: Vec3, uv: Point2, face: u32) -> TextureContext {
+    TextureContext {
+        p,
+        n: n.normalize().as_normal(),
+        uv,
+        dpdx: Vec3::ZERO,
+        dpdy: Vec3::ZERO,
+        dudx: 0.0,
+        dudy: 0.0,
+        dvdx: 0.0,
+        dvdy: 0.0,
+        face,
+    }
+}
+
+impl<A: AlphaTextures> GroupLeaves<'_, A> {
+    fn meet(&self, user: u32, ray: &bvh::Ray) -> Option<(f32, Hit)> {
+        let shapes = &self.geometry.shapes;
+        let hit = |t: f32, u: f32, v: f32| Hit { t, u, v, primitive: user, is_user: true, instances: [NO_INSTANCE; 2] };
+        // A root counts with 0 < t < t_max, first as a double, then as the single that is reported.
+        let within = |t: f64| t > 0.0 && (t as f32) > 0.0 && (t as f32) < ray.t_max;
+        match self.group.users[user as usize] {
+            User::Sphere { shape, sphere } => {
+                let s = &shapes.spheres[sphere as usize];
+                let single = to_ray(ray);
+                let (o, d) = s.placement.ray_to_shape(&single);
+                let roots = s.roots(o, d)?;
+                (0..2).find_map(|i| {
+                    let t = roots[i];
+                    let p = within(t).then(|| s.point(o, d, t)).flatten()?;
+                    let there = self.is_there(shape, &single, i > 0, || {
+                        context(s.placement.point(p).0, s.placement.unit_normal(p).0.as_vec(), s.uv(p), 0)
+                    });
+                    there.then(|| (t as f32, hit(t as f32, i as f32, 0.0)))
+                })
+            }
+            User::Cylinder { shape, cylinder } => {
+                let c = &shapes.cylinders[cylinder as usize];
+                let single = to_ray(ray);
+                let (o, d) = c.placement.ray_to_shape(&single);
+                let roots = c.roots(o, d)?;
+                (0..2).find_map(|i| {
+                    let t = roots[i];
+                    let p = within(t).then(|| c.point(o, d, t)).flatten()?;
+                    let there = self.is_there(shape, &single, i > 0, || {
+                        let n = c.placement.unit_normal([p[0], p[1], 0.0]).0;
+                        context(c.placement.point(p).0, n.as_vec(), c.uv(p), 0)
+                    });
+                    there.then(|| (t as f32, hit(t as f32, i as f32, 0.0)))
+                })
+            }
+            User::Disk { shape, disk } => {
+                let k = &shapes.disks[disk as usize];
+                let single = to_ray(ray);
+                let (o, d) = k.placement.ray_to_shape(&single);
+                let (t, p) = k.meet(o, d).filter(|(t, _)| within(*t))?;
+                let there = self.is_there(shape, &single, false, || {
+                    let n = k.placement.unit_normal([0.0, 0.0, 1.0]).0;
+                    context(k.placement.point(p).0, n.as_vec(), k.uv(p), 0)
+                });
+                there.then(|| (t as f32, hit(t as f32, 0.0, 0.0)))
+            }
+            User::Patch { mesh, quad } => {
+                let shape = shapes.mesh_shapes[mesh as usize];
+                let mesh = &shapes.meshes[mesh as usize];
+                let single = to_ray(ray);
+                let corners = mesh.corners(quad);
+                let mut met = bilinear::meet(&single, &corners).into_iter().flatten().enumerate();
+                met.find_map(|(i, h)| {
+                    let (u, v) = (h.u as f32, h.v as f32);
+                    let there = within(h.t)
+                        && self.is_there(shape, &single, i > 0, || {
+                            let (p, _) = bilinear::point_and_error(&corners, h.u, h.v);
+                            let (du, dv) = bilinear::derivatives(&corners, h.u, h.v);
+                            let n = super::placement::single(super::placement::cross(du, dv)).into();
+                            context(p, n, mesh.patch_uv(quad, u, v), mesh.face(mesh.triangles.len() + quad as usize))
+                        });
+                    there.then(|| (h.t as f32, hit(h.t as f32, u, v)))
+                })
+            }
+            User::Curve { shape, curve, piece } => {
+                let single = to_ray(ray);
+                let CurveHit { t, u, v } = shapes.curves[curve as usize].meet(piece, &single, ray.t_max)?;
+                let there =
+                    self.is_there(shape, &single, false, || context(single.at(t), -single.d, Point2::new(u, v), 0));
+                there.then(|| (t, hit(t, u, v)))
+            }
+            User::Instance(i) => {
+                let instance = &shapes.instances[i as usize];
+                let local = instance.ray_to_group(ray);
+                let group = &self.geometry.groups[instance.group as usize];
+                let mut found = self.geometry.closest(group, &local, &GroupLeaves { group, ..*self })?;
+                found.instances = [i, found.instances[0]];
+                Some((found.t, found))
+            }
+        }
+    }
+
+    /// Whether a user primitive of `shape` is there for a ray. A ray that has passed its first hit looks at the second
+    /// with a choice of its own, like pbrt's, which starts a new ray there.
+    #[inline]
+    fn is_there(&self, shape: u32, ray: &Ray, again: bool, at: impl FnOnce() -> TextureContext) -> bool {
+        let alpha = match self.geometry.shapes.infos[shape as usize].alpha {
+            Alpha::Opaque => return true,
+            Alpha::Constant(a) => a,
+            Alpha::Texture(texture) => self.alpha.alpha(texture, &at()),
+        };
+        // Twice the direction is the same ray with another hash.
+        is_there(alpha, ray.o, if again { ray.d * 2.0 } else { ray.d })
+    }
+}
+
+impl<A> Clone for GroupLeaves<'_, A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A> Copy for GroupLeaves<'_, A> {}

@@ -1,0 +1,282 @@
+//! What rays meet: shapes in render space, the trees over them, and the emitters among them.
+//!
+//! # Layout
+//! In reading order: this file (what a ray may ask: [`Geometry`]); `compile` (from the description); `accel` (groups,
+//! trees, alpha); `instance` (groups placed elsewhere, moving or not); the shapes `triangle`, `bilinear`, `sphere`,
+//! `disk`, `cylinder`, `curve`; `placement` (quadrics' own spaces); [`emitter`] (shapes as sources of light).
+//!
+//! # Robustness
+//! No epsilon is anyone's to choose. Hit points are put back on their surface (quadrics on the quadric in `f64`,
+//! triangles on the plane by weights) and carry a bound on what is left; rays leave from beyond that bound
+//! ([`Interaction::spawn_ray`]); a triangle must be farther than the error of its own `t`. After Pharr, Jakob and
+//! Humphreys 2023, section 6.8.
+//!
+//! It does not know what surfaces are made of, nor what light is; it hands out ids.
+
+mod accel;
+mod bilinear;
+mod compile;
+mod curve;
+mod cylinder;
+mod disk;
+pub mod emitter;
+mod instance;
+mod placement;
+mod spawn;
+mod sphere;
+#[cfg(test)]
+mod tests;
+mod triangle;
+
+pub use accel::Alpha;
+pub use compile::compile_geometry;
+pub use emitter::{EmitterShape, NormalCone, ShapeSample};
+
+use crate::interaction::{Interaction, LightId, MaterialId, ShapeId, TextureContext};
+use accel::{Group, GroupLeaves, NO_EMITTER, Shapes, User, to_tree};
+use irradiant_bvh as bvh;
+use irradiant_math::{Bounds3, Normal3, Point2, Point3, Ray, Vec3};
+use irradiant_scene::desc::FloatTextureRef;
+
+/// Evaluates opacity textures for hits that depend on them.
+pub trait AlphaTextures {
+    /// Opacity at a point: 1 or more is there, 0 or less is not, and between is there for that share of rays.
+    ///
+    /// Inside objects and moving shapes the context is in the object's own space, as pbrt's is.
+    fn alpha(&self, texture: FloatTextureRef, at: &TextureContext) -> f32;
+}
+
+/// For scenes without opacity textures: everything is there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoAlphaTextures;
+
+impl AlphaTextures for NoAlphaTextures {
+    fn alpha(&self, _texture: FloatTextureRef, _at: &TextureContext) -> f32 {
+        1.0
+    }
+}
+
+pub(crate) const NO_INSTANCE: u32 = u32::MAX;
+
+/// The closest thing a ray meets; [`Geometry::interaction`] tells what it looks like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Ray parameter, in lengths of the ray's direction.
+    pub t: f32,
+    /// First parameter of the place: weight of vertex 1, u, or which root.
+    pub(crate) u: f32,
+    /// Second parameter: weight of vertex 2, or v.
+    pub(crate) v: f32,
+    /// Index in its tree.
+    pub(crate) primitive: u32,
+    /// Not a triangle.
+    pub(crate) is_user: bool,
+    /// Instances from outside in.
+    pub(crate) instances: [u32; 2],
+}
+
+/// A surface element that emits.
+#[derive(Clone, Debug)]
+pub struct Emitter {
+    /// The shape it is part of.
+    pub shape: ShapeId,
+    /// Its face there: triangle, then quad, or piece of curve; 0 for quadrics.
+    pub face: u32,
+    /// Opacity of the shape.
+    pub alpha: Alpha,
+    /// Its form.
+    pub geometry: EmitterShape,
+}
+
+/// All shapes of a scene, ready to be met by rays. Immutable but for [`Geometry::assign_lights`].
+#[derive(Debug)]
+pub struct Geometry {
+    pub(crate) level: bvh::Level,
+    pub(crate) shapes: Shapes,
+    /// The scene itself, then objects and moving shapes.
+    pub(crate) groups: Vec<Group>,
+    emitters: Vec<Emitter>,
+    lights: Vec<Option<LightId>>,
+}
+
+impl Geometry {
+    /// The closest surface with 0 < t < `t_max`, in lengths of `ray.d` (which need not be unit).
+    #[inline]
+    pub fn intersect(&self, ray: &Ray, t_max: f32, alpha: &impl AlphaTextures) -> Option<Hit> {
+        let group = &self.groups[0];
+        self.closest(group, &to_tree(ray, t_max), &GroupLeaves { geometry: self, group, alpha })
+    }
+
+    /// Whether any surface lies at 0 < t < `t_max`.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray, t_max: f32, alpha: &impl AlphaTextures) -> bool {
+        let group = &self.groups[0];
+        group.tree.occluded(self.level, &to_tree(ray, t_max), &GroupLeaves { geometry: self, group, alpha })
+    }
+
+    /// Whether any surface lies between two points that [`spawn_ray_to`](Interaction::spawn_ray_to) connected.
+    #[inline]
+    pub fn occluded_between(&self, segment: &Ray, alpha: &impl AlphaTextures) -> bool {
+        self.occluded(segment, 1.0, alpha)
+    }
+
+    pub(crate) fn closest<A: AlphaTextures>(
+        &self,
+        group: &Group,
+        ray: &bvh::Ray,
+        leaves: &GroupLeaves<A>,
+    ) -> Option<Hit> {
+        Some(match group.tree.intersect(self.level, ray, leaves)? {
+            bvh::Closest::Triangle(bvh::Hit { t, u, v, primitive, .. }) => {
+                Hit { t, u, v, primitive, is_user: false, instances: [NO_INSTANCE; 2] }
+            }
+            bvh::Closest::User { hit, .. } => hit,
+        })
+    }
+
+    /// What the ray met at `hit` (which [`Geometry::intersect`] gave for this very ray).
+    pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
+        let mut at = Interaction {
+            p: Point3::ZERO,
+            p_error: Vec3::ZERO,
+            n: Normal3::ZERO,
+            ns: Normal3::ZERO,
+            uv: Point2::ZERO,
+            dpdu: Vec3::ZERO,
+            dpdv: Vec3::ZERO,
+            dpdus: Vec3::ZERO,
+            dpdvs: Vec3::ZERO,
+            dndus: Normal3::ZERO,
+            dndvs: Normal3::ZERO,
+            wo: -ray.d.normalize(),
+            t: hit.t,
+            time: ray.time,
+            material: MaterialId(0),
+            light: None,
+            shape: ShapeId(0),
+            face: 0,
+        };
+        self.fill(0, &to_tree(ray, f32::INFINITY), hit, hit.instances, &mut at);
+        at
+    }
+
+    /// Fills in a hit in the space of a group.
+    fn fill(&self, group: u32, ray: &bvh::Ray, hit: &Hit, instances: [u32; 2], at: &mut Interaction) {
+        if instances[0] != NO_INSTANCE {
+            let instance = &self.shapes.instances[instances[0] as usize];
+            let affine = instance.at(ray.time);
+            self.fill(instance.group, &instance::ray_inside(&affine, ray), hit, [instances[1], NO_INSTANCE], at);
+            instance::interaction_outside(&affine, at);
+            return;
+        }
+        let group = &self.groups[group as usize];
+        let shapes = &self.shapes;
+        let (shape, emitter) = if hit.is_user {
+            let single = accel::to_ray(ray);
+            let mut quadric = |placed: Option<placement::Placed>| {
+                // The roots were there when the ray met them, and this is the same computation.
+                let Some(p) = placed else { return };
+                (at.p, at.p_error, at.n, at.ns, at.uv) = (p.p, p.p_error, p.n, p.n, p.uv);
+                (at.dpdu, at.dpdv, at.dpdus, at.dpdvs) = (p.dpdu, p.dpdv, p.dpdu, p.dpdv);
+                (at.dndus, at.dndvs) = (p.dndu, p.dndv);
+            };
+            let root = hit.u as usize;
+            match group.users[hit.primitive as usize] {
+                User::Sphere { shape, sphere } => {
+                    quadric(shapes.spheres[sphere as usize].place(&single, root));
+                    (shape, 0)
+                }
+                User::Disk { shape, disk } => {
+                    quadric(shapes.disks[disk as usize].place(&single));
+                    (shape, 0)
+                }
+                User::Cylinder { shape, cylinder } => {
+                    quadric(shapes.cylinders[cylinder as usize].place(&single, root));
+                    (shape, 0)
+                }
+                User::Patch { mesh, quad } => {
+                    let m = &shapes.meshes[mesh as usize];
+                    m.patch_interaction(quad, hit.u, hit.v, at);
+                    (shapes.mesh_shapes[mesh as usize], m.triangles.len() as u32 + quad)
+                }
+                User::Curve { shape, curve, piece } => {
+                    let met = curve::CurveHit { t: hit.t, u: hit.u, v: hit.v };
+                    shapes.curves[curve as usize].interaction(piece, &single, &met, at);
+                    (shape, piece)
+                }
+                User::Instance(_) => return,
+            }
+        } else {
+            let (mesh, triangle) = group.triangle(hit.primitive);
+            shapes.meshes[mesh as usize].triangle_interaction(triangle, hit.u, hit.v, at);
+            (shapes.mesh_shapes[mesh as usize], triangle)
+        };
+        let info = &shapes.infos[shape as usize];
+        at.material = info.material;
+        at.shape = ShapeId(shape);
+        if info.first_emitter != NO_EMITTER {
+            at.light = self.lights[(info.first_emitter + emitter) as usize];
+        }
+    }
+
+    /// The surface elements that emit, each to become one light.
+    pub fn emitters(&self) -> &[Emitter] {
+        &self.emitters
+    }
+
+    /// Says which light each emitter became; `None` for those that are no light after all. Until then emitter `i` is
+    /// light `i`. A short list leaves the rest without light.
+    pub fn assign_lights(&mut self, lights: impl IntoIterator<Item = Option<LightId>>) {
+        let mut lights: Vec<Option<LightId>> = lights.into_iter().collect();
+        lights.resize(self.emitters.len(), None);
+        self.lights = lights;
+    }
+
+    /// A box around everything; empty for an empty scene.
+    pub fn bounds(&self) -> Bounds3 {
+        match self.groups[0].tree.bounds() {
+            Some([min, max]) => Bounds3 { min: min.into(), max: max.into() },
+            None => Bounds3::EMPTY,
+        }
+    }
+
+    /// Number of shapes as the author described them, those of objects included: [`ShapeId`]s are below it.
+    pub fn n_shapes(&self) -> usize {
+        self.shapes.infos.len()
+    }
+
+    /// What a shape is made of.
+    pub fn material(&self, shape: ShapeId) -> MaterialId {
+        self.shapes.infos[shape.0 as usize].material
+    }
+
+    /// How much of a shape is there.
+    pub fn alpha(&self, shape: ShapeId) -> Alpha {
+        self.shapes.infos[shape.0 as usize].alpha
+    }
+
+    /// Uses other instructions for traversal; results are the same bits.
+    pub fn set_level(&mut self, level: bvh::Level) {
+        self.level = level;
+    }
+
+    /// Number of triangles, and of other primitives, over all groups.
+    pub fn n_primitives(&self) -> (usize, usize) {
+        let triangles = self.shapes.meshes.iter().map(|m| m.triangles.len()).sum();
+        (triangles, self.groups.iter().map(|g| g.users.len()).sum())
+    }
+
+    /// Bytes held by vertices, faces, trees and emitters.
+    pub fn memory_bytes(&self) -> usize {
+        let s = &self.shapes;
+        s.meshes.iter().map(triangle::Mesh::memory_bytes).sum::<usize>()
+            + s.curves.iter().map(curve::Curve::memory_bytes).sum::<usize>()
+            + size_of_val(&s.spheres[..])
+            + size_of_val(&s.disks[..])
+            + size_of_val(&s.cylinders[..])
+            + size_of_val(&s.instances[..])
+            + size_of_val(&s.infos[..])
+            + self.groups.iter().map(|g| g.tree.memory_bytes() + size_of_val(&g.users[..])).sum::<usize>()
+            + self.emitters.iter().map(|e| size_of_val(e) + e.geometry.memory_bytes()).sum::<usize>()
+    }
+}
