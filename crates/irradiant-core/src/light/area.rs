@@ -160,6 +160,8 @@ impl AreaLight {
     /// See [`super::Light::bounds`].
     pub fn bounds(&self) -> LightBounds {
         let size = match &self.radiance {
+            // Curves are never drawn from, so they should not be picked.
+            _ if matches!(self.shape, EmitterShape::Curve(_)) => 0.0,
             AreaRadiance::Uniform(emission) => emission.max_value(),
             AreaRadiance::Image(a) => a.mean_rgb.iter().sum::<f32>() / 3.0 * a.scale,
         };

@@ -52,7 +52,11 @@ impl Cone {
         let angle = (angle_a + between + angle_b) * 0.5 + 1e-3;
         let normal = a.axis.cross(b.axis);
         if angle >= PI || normal.length_squared() < 1e-12 {
-            return if between < 1.0 && angle < PI { Self { axis: a.axis, cos: cos((2.0 * angle - angle_a).min(PI)) } } else { Self::ALL };
+            return if between < 1.0 && angle < PI {
+                Self { axis: a.axis, cos: cos((2.0 * angle - angle_a).min(PI)) }
+            } else {
+                Self::ALL
+            };
         }
         // Turn a's axis towards b's.
         let toward = normal.normalize().cross(a.axis);
@@ -94,6 +98,12 @@ impl LightBounds {
         self.power * directions * stretch * places
     }
 
+    /// The least squared distance that counts: half of the diagonal, as pbrt-v4, and never 0, so that importance is
+    /// finite.
+    pub fn least_distance_squared(&self) -> f32 {
+        (self.bounds.diagonal().length() * 0.5).max(1e-20)
+    }
+
     /// An estimate of what arrives at `p` on a surface of normal `n` (zero: no surface); 0 only when nothing can.
     ///
     /// The scalar form of what the tree computes four lanes at a time.
@@ -102,7 +112,7 @@ impl LightBounds {
         let offset = p - center;
         let distance_squared = offset.length_squared();
         let radius = center.distance(self.bounds.max);
-        let clamped = distance_squared.max(self.bounds.diagonal().length() * 0.5);
+        let clamped = distance_squared.max(self.least_distance_squared());
         let wi = offset * (1.0 / distance_squared.max(f32::MIN_POSITIVE).sqrt());
 
         // cos and sin of max(0, a - b).

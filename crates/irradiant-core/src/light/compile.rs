@@ -1,7 +1,7 @@
 //! Lights from their description: range checks, pbrt-v4's scales, images.
 //!
 //! Codes: E0801 a factor out of range, E0802 a spectrum, E0803 an unknown spectrum name, E0804 a direction or an angle,
-//! E0805 an image, E0806 a portal, E0807 contradicting parameters; W0808 bad pixels, W0809 not honoured, W0810 a value
+//! E0805 an image, E0806 a portal, E0807 contradicting parameters; W0808 bad pixels, W0809 not honoured or ignored, W0810 a value
 //! that has no effect.
 
 use super::area::{AreaAlpha, AreaLight, AreaRadiance};
@@ -13,13 +13,16 @@ use super::{
     DistantLight, Emission, GoniometricLight, ImageInfiniteLight, Light, PointLight, SceneSphere, SpotLight,
     UniformInfiniteLight,
 };
-use crate::geometry::EmitterShape;
+use crate::geometry::{Alpha, EmitterShape, Geometry};
 use crate::interaction::LightId;
 use irradiant_image::Image;
 use irradiant_math::elementary::cos;
 use irradiant_math::{Bounds3, Point3, Transform, Vec3, warp};
+use irradiant_scene::SceneDesc;
+use irradiant_scene::desc::texture::BasicTexture;
 use irradiant_scene::desc::{
-    AreaLightDesc, ColorSpaceName, FileDesc, FloatParam, LightDesc, LightKind, PortalDesc, SpectrumDesc,
+    AreaLightDesc, ColorSpaceName, FileDesc, FloatParam, FloatTextureKind, LightDesc, LightKind, MaterialKind,
+    PortalDesc, SpectrumDesc,
 };
 use irradiant_scene::diagnostic::did_you_mean;
 use irradiant_scene::{Diagnostic, Diagnostics, Span, Spanned};
@@ -41,21 +44,17 @@ pub struct LightContext<'a> {
     pub load_image: &'a mut dyn FnMut(&Spanned<FileDesc>, &mut Diagnostics) -> Option<Arc<Image>>,
 }
 
-/// A surface that emits, as geometry hands it over.
-#[derive(Clone, Debug)]
-pub struct AreaEmitter {
-    /// Where.
+/// A surface that emits.
+pub(super) struct AreaEmitter {
     pub shape: EmitterShape,
-    /// What its author said.
     pub desc: Arc<AreaLightDesc>,
-    /// Opacity of the shape; a texture that is a constant should be handed over as that constant.
-    pub alpha: Option<FloatParam>,
+    pub alpha: AreaAlpha,
 }
 
 /// All lights of a scene, by [`LightId`].
 #[derive(Debug, Default)]
 pub struct Lights {
-    list: Vec<Light>,
+    pub(super) list: Vec<Light>,
     environments: Vec<LightId>,
 }
 
@@ -67,20 +66,43 @@ impl Lights {
         Self { list, environments }
     }
 
-    /// Compiles the area lights of `emitters`, whose ids are their indices, and then `lights`.
+    /// All lights of `desc`: those of `geometry`'s emitters first, which are told their ids, then the others in order.
     ///
-    /// Lights with errors are left out of the list, which is then of no use. Emitters of surfaces whose material is an
-    /// interface should not be handed over: pbrt-v4 ignores their emission.
+    /// Shapes of interface materials do not emit, as in pbrt-v4. Complaints go to `diagnostics`; lights with errors are
+    /// left out, so the result is sound even when it should not be used.
     pub fn compile(
-        lights: &[LightDesc],
-        emitters: impl IntoIterator<Item = AreaEmitter>,
+        desc: &SceneDesc,
+        geometry: &mut Geometry,
         context: &mut LightContext<'_>,
         diagnostics: &mut Diagnostics,
     ) -> Self {
         let scene = SceneSphere::new(&context.scene_bounds);
         let mut compiler = Compiler { context, diagnostics, scene };
-        let mut list = compiler.area_lights(emitters);
-        list.extend(lights.iter().filter_map(|l| compiler.light(l)));
+        let mut ignored = Vec::new();
+        let emitters: Vec<Option<AreaEmitter>> = geometry
+            .emitters()
+            .iter()
+            .map(|emitter| {
+                // Shape ids count the scene's own shapes first, and only those emit.
+                let shape = desc.shapes.get(emitter.shape.0 as usize)?;
+                let area_light = shape.area_light.as_ref()?;
+                let material = desc.materials.get(shape.material.0 as usize);
+                if material.is_some_and(|m| matches!(m.kind, MaterialKind::Interface)) {
+                    if ignored.last() != Some(&shape.span) {
+                        ignored.push(shape.span);
+                    }
+                    return None;
+                }
+                let alpha = area_alpha(desc, emitter.alpha);
+                Some(AreaEmitter { shape: emitter.geometry.clone(), desc: area_light.clone(), alpha })
+            })
+            .collect();
+        for span in ignored {
+            compiler.warning("W0809", "emission of a shape whose material is \"interface\" is ignored", span);
+        }
+        let (mut list, ids) = compiler.area_lights(emitters);
+        geometry.assign_lights(ids);
+        list.extend(desc.lights.iter().filter_map(|l| compiler.light(l)));
         Self::new(list)
     }
 
@@ -183,7 +205,8 @@ impl Compiler<'_, '_> {
             }
             SpectrumDesc::Rgb(rgb, name) => {
                 if !rgb.iter().all(|v| v.is_finite() && *v >= 0.0) {
-                    let message = format!("emission of RGB ({}, {}, {}) has a component below 0", rgb[0], rgb[1], rgb[2]);
+                    let message =
+                        format!("emission of RGB ({}, {}, {}) has a component below 0", rgb[0], rgb[1], rgb[2]);
                     self.error("E0802", message, span);
                     return None;
                 }
@@ -278,8 +301,12 @@ impl Compiler<'_, '_> {
     fn light(&mut self, desc: &LightDesc) -> Option<Light> {
         if desc.world_from_light.is_animated() {
             self.diagnostics.push(
-                Diagnostic::warning("W0809", "lights do not move: the transform at the shutter's start is used", desc.span)
-                    .not_honoured("moving lights: at the shutter's start"),
+                Diagnostic::warning(
+                    "W0809",
+                    "lights do not move: the transform at the shutter's start is used",
+                    desc.span,
+                )
+                .not_honoured("moving lights: at the shutter's start"),
             );
         }
         let render_from_light = self.context.render_from_world.compose(&desc.world_from_light.start);
@@ -350,8 +377,7 @@ impl Compiler<'_, '_> {
                 // The image's z is the light's y.
                 let mut swap = Transform::IDENTITY.m;
                 swap.swap(1, 2);
-                let orientation =
-                    Orientation::new(&render_from_light.compose(&Transform { m: swap, inv: swap }));
+                let orientation = Orientation::new(&render_from_light.compose(&Transform { m: swap, inv: swap }));
                 let intensity = Emission::new(&shine.spectrum, scale * shine.unit * asked, space);
                 GoniometricLight::new(at([0.0; 3]), orientation, intensity, values, size)
                     .map(|l| Light::Goniometric(Box::new(l)))
@@ -444,7 +470,11 @@ impl Compiler<'_, '_> {
         match PortalInfiniteLight::new(corners, &image, &orientation, scale) {
             Ok(l) => Some(Light::PortalInfinite(Box::new(l))),
             Err(PortalError::NotRectangle) => {
-                self.error("E0806", "the four corners of this portal are not a rectangle, in order around it", portal.span);
+                self.error(
+                    "E0806",
+                    "the four corners of this portal are not a rectangle, in order around it",
+                    portal.span,
+                );
                 None
             }
             Err(PortalError::NotSquare) => {
@@ -454,29 +484,27 @@ impl Compiler<'_, '_> {
         }
     }
 
-    fn area_lights(&mut self, emitters: impl IntoIterator<Item = AreaEmitter>) -> Vec<Light> {
+    /// The lights, and for each emitter the id of its light.
+    fn area_lights(&mut self, emitters: Vec<Option<AreaEmitter>>) -> (Vec<Light>, Vec<Option<LightId>>) {
         // Descriptions are shared by the primitives of a shape; look-ups only, so its order never shows.
         let mut known: HashMap<*const AreaLightDesc, Option<AreaPart>> = HashMap::new();
-        let mut list = Vec::new();
-        for emitter in emitters {
-            let part = known.entry(Arc::as_ptr(&emitter.desc)).or_insert_with(|| self.area_part(&emitter.desc));
-            let Some(part) = part else { continue };
-            let alpha = match emitter.alpha {
-                None => AreaAlpha::Constant(1.0),
-                Some(FloatParam::Value(a)) if a <= 0.0 => AreaAlpha::Unseen,
-                Some(FloatParam::Value(a)) => AreaAlpha::Constant(a.min(1.0)),
-                Some(FloatParam::Texture(texture)) => AreaAlpha::Texture(texture),
-            };
-            let two_sided = emitter.desc.two_sided;
-            let scale = part.power.map_or(1.0, |phi| {
-                let sides = if two_sided { 2.0 } else { 1.0 };
-                let luminous = part.luminance * sides * emitter.shape.area() * PI;
-                if luminous > 0.0 { phi / luminous } else { 0.0 }
-            });
-            let radiance = part.radiance.clone();
-            list.push(Light::Area(AreaLight { shape: emitter.shape, radiance, scale, two_sided, alpha }));
-        }
-        list
+        let mut list = Vec::with_capacity(emitters.len());
+        let ids = emitters
+            .into_iter()
+            .map(|emitter| {
+                let AreaEmitter { shape, desc, alpha } = emitter?;
+                let part = known.entry(Arc::as_ptr(&desc)).or_insert_with(|| self.area_part(&desc)).as_ref()?;
+                let two_sided = desc.two_sided;
+                let scale = part.power.map_or(1.0, |phi| {
+                    let sides = if two_sided { 2.0 } else { 1.0 };
+                    let luminous = part.luminance * sides * shape.area() * PI;
+                    if luminous > 0.0 { phi / luminous } else { 0.0 }
+                });
+                list.push(Light::Area(AreaLight { shape, radiance: part.radiance.clone(), scale, two_sided, alpha }));
+                Some(LightId(list.len() as u32 - 1))
+            })
+            .collect();
+        (list, ids)
     }
 
     fn area_part(&mut self, desc: &AreaLightDesc) -> Option<AreaPart> {
@@ -498,6 +526,19 @@ impl Compiler<'_, '_> {
         let unit = illuminant_unit(space_of(desc.color_space));
         Some(AreaPart { radiance: AreaRadiance::image(image, scale * unit), power, luminance })
     }
+}
+
+/// What a shape's opacity is to its light; textures that are a number count as that number.
+fn area_alpha(desc: &SceneDesc, alpha: Alpha) -> AreaAlpha {
+    let number = match alpha {
+        Alpha::Opaque => 1.0,
+        Alpha::Constant(a) => a,
+        Alpha::Texture(texture) => match desc.float_textures.get(texture.0 as usize).map(|t| &t.kind) {
+            Some(FloatTextureKind::Basic(BasicTexture::Constant(Spanned { value: FloatParam::Value(a), .. }))) => *a,
+            _ => return AreaAlpha::Texture(texture),
+        },
+    };
+    if number <= 0.0 { AreaAlpha::Unseen } else { AreaAlpha::Constant(number.min(1.0)) }
 }
 
 /// What the primitives of one description share.

@@ -206,10 +206,14 @@ impl RadianceImage {
         let (x0, y0) = (x.floor(), y.floor());
         let (dx, dy) = (x - x0, y - y0);
         let (x0, y0) = (x0 as i64, y0 as i64);
-        let corners = [pixel(self, x0, y0), pixel(self, x0 + 1, y0), pixel(self, x0, y0 + 1), pixel(self, x0 + 1, y0 + 1)];
+        let corners =
+            [pixel(self, x0, y0), pixel(self, x0 + 1, y0), pixel(self, x0, y0 + 1), pixel(self, x0 + 1, y0 + 1)];
         let weights = [(1.0 - dx) * (1.0 - dy), dx * (1.0 - dy), (1.0 - dx) * dy, dx * dy];
         std::array::from_fn(|c| {
-            weights[0] * corners[0][c] + weights[1] * corners[1][c] + weights[2] * corners[2][c] + weights[3] * corners[3][c]
+            weights[0] * corners[0][c]
+                + weights[1] * corners[1][c]
+                + weights[2] * corners[2][c]
+                + weights[3] * corners[3][c]
         })
     }
 
@@ -309,16 +313,19 @@ mod tests {
                 image.pixels[y * n + x] = f(w);
             }
         }
-        let mut worst = 0f32;
         for i in 0..1000 {
             let t = (i as f32 + 0.5) / 1000.0;
-            for uv in [Point2::new(t, 1e-4), Point2::new(1e-4, t), Point2::new(t, 0.9999), Point2::new(0.9999, t)] {
-                let exact = f(irradiant_math::warp::equal_area_square_to_sphere(uv));
-                let got = image.bilinear_octahedral(uv);
-                worst = (0..3).fold(worst, |m, c| m.max((got[c] - exact[c]).abs()));
+            for far in [1e-6, 1.0 - 1e-6] {
+                for (a, b) in
+                    [(Point2::new(t, far), Point2::new(1.0 - t, far)), (Point2::new(far, t), Point2::new(far, 1.0 - t))]
+                {
+                    let exact = f(irradiant_math::warp::equal_area_square_to_sphere(a));
+                    let (a, b) = (image.bilinear_octahedral(a), image.bilinear_octahedral(b));
+                    // The map has a crease at the border: half a pixel away the slope is another.
+                    assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-3 && (a[c] - exact[c]).abs() < 0.05));
+                }
             }
         }
-        assert!(worst < 0.02, "{worst}");
     }
 
     #[test]

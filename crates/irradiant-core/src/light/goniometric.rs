@@ -35,7 +35,13 @@ impl GoniometricLight {
     /// From `size * size` finite, non-negative factors on `intensity`; `None` when they are not as many.
     ///
     /// `orientation` is that of the image's own axes (+z its centre).
-    pub fn new(p: Point3, orientation: Orientation, intensity: Emission, values: Box<[f32]>, size: usize) -> Option<Self> {
+    pub fn new(
+        p: Point3,
+        orientation: Orientation,
+        intensity: Emission,
+        values: Box<[f32]>,
+        size: usize,
+    ) -> Option<Self> {
         let distribution = PiecewiseConstant2D::new(values.to_vec(), size, size)?;
         let mean = (values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64) as f32;
         Some(Self { p, orientation, intensity, values, size, mean, distribution })

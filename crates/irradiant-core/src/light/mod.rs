@@ -33,7 +33,7 @@ mod tests;
 
 pub use area::{AreaAlpha, AreaLight, AreaRadiance};
 pub use bounds::LightBounds;
-pub use compile::{AreaEmitter, LightContext, Lights};
+pub use compile::{LightContext, Lights};
 pub use distant::DistantLight;
 pub use emission::{Emission, RadianceImage};
 pub use environment::{ImageInfiniteLight, UniformInfiniteLight};
@@ -336,13 +336,7 @@ impl Light {
     /// Draws a ray that leaves the light, for light tracing; `None` when there is nothing to draw.
     ///
     /// Its share of power is radiance cos / (pdf_position pdf_direction), cos to `normal` where there is one.
-    pub fn emit(
-        &self,
-        u_position: Point2,
-        u_direction: Point2,
-        lambda: &Wavelengths,
-        time: f32,
-    ) -> Option<EmittedRay> {
+    pub fn emit(&self, u_position: Point2, u_direction: Point2, lambda: &Wavelengths, time: f32) -> Option<EmittedRay> {
         match self {
             Self::Point(l) => l.emit(u_direction, lambda, time),
             Self::Distant(l) => l.emit(u_position, lambda, time),

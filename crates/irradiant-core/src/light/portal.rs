@@ -47,7 +47,7 @@ impl PortalInfiniteLight {
         equal_area: &RadianceImage,
         orientation: &Orientation,
         scale: f32,
-        ) -> Result<Self, PortalError> {
+    ) -> Result<Self, PortalError> {
         let side = |a: usize, b: usize| (corners[b] - corners[a]).normalize();
         let (p01, p12, p32, p03) = (side(0, 1), side(1, 2), side(3, 2), side(0, 3));
         let parallel = |a: Vec3, b: Vec3| (a.dot(b) - 1.0).abs() <= 1e-3;

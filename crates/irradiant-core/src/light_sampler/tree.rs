@@ -23,7 +23,7 @@ type Lanes = [f32; WIDTH];
 struct Node {
     center: [Lanes; 3],
     radius_squared: Lanes,
-    /// Least squared distance that counts: half of the diagonal, as pbrt-v4.
+    /// See [`LightBounds::least_distance_squared`].
     least: Lanes,
     axis: [Lanes; 3],
     cos_normals: Lanes,
@@ -85,7 +85,7 @@ impl Node {
             self.axis[i][lane] = a;
         }
         self.radius_squared[lane] = radius * radius;
-        self.least[lane] = b.bounds.diagonal().length() * 0.5;
+        self.least[lane] = b.least_distance_squared();
         self.cos_normals[lane] = b.cos_normals;
         self.sin_normals[lane] = (1.0 - b.cos_normals * b.cos_normals).max(0.0).sqrt();
         self.cos_emission[lane] = b.cos_emission;

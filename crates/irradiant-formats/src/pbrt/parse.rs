@@ -95,6 +95,7 @@ pub(crate) struct Parser<'r, 'a> {
     state: GraphicsState,
     pushed: Vec<Pushed>,
     block: Block,
+    world_begin: Span,
     coordinate_systems: BTreeMap<String, TransformPair>,
     active_object: Option<usize>,
     bytes_left: u64,
@@ -121,6 +122,7 @@ impl<'r, 'a> Parser<'r, 'a> {
             state: GraphicsState::default(),
             pushed: vec![],
             block: Block::Options,
+            world_begin: Span::NONE,
             coordinate_systems: BTreeMap::new(),
             active_object: None,
             bytes_left: r.limits.max_total_bytes,
@@ -152,7 +154,10 @@ impl<'r, 'a> Parser<'r, 'a> {
         }
         self.bytes_left = self.bytes_left.saturating_sub(text.len() as u64);
         let end = text.len() as u32;
-        self.frames.push(Frame { lexer: Lexer::new(text, file), path: None, import: None });
+        // A scene that includes itself does so by the name of its file, beside which it stands.
+        let own_name = std::path::Path::new(name).file_name().map(|n| n.to_string_lossy());
+        let path = own_name.map(|n| self.r.resolve(&n));
+        self.frames.push(Frame { lexer: Lexer::new(text, file), path, import: None });
         while let Some(frame) = self.frames.last_mut() {
             if self.r.gave_up() {
                 break;
@@ -714,8 +719,13 @@ impl<'r, 'a> Parser<'r, 'a> {
             b"Option" => self.option()?,
             b"WorldBegin" => {
                 if self.block == Block::World {
-                    r.error("E0113", "a second WorldBegin", span);
+                    r.push(
+                        Diagnostic::error("E0113", "a second WorldBegin", span)
+                            .also(self.world_begin, "the world began here")
+                            .help("leave it out"),
+                    );
                 }
+                self.world_begin = span;
                 self.block = Block::World;
                 self.state.transforms = [Transform::IDENTITY; 2];
                 self.state.active = [true; 2];
