@@ -4,7 +4,7 @@
 use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::simple_path::environment;
-use irradiant_core::bxdf::{Sides, TransportMode};
+use irradiant_core::bxdf::TransportMode;
 use irradiant_core::film::FilmTile;
 use irradiant_core::scene::Scene;
 use irradiant_math::warp;

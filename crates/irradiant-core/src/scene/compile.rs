@@ -4,16 +4,16 @@ use super::{Facts, LayerPlan, Scene};
 use crate::camera::{self, CompiledCamera};
 use crate::film::PixelBounds;
 use crate::film::filter::Filter;
-use crate::geometry::{Alpha, Geometry, compile_geometry};
+use crate::geometry::{Geometry, compile_geometry};
 use crate::interaction::MaterialId;
-use crate::light::{AreaEmitter, LightContext, Lights};
+use crate::light::{LightContext, Lights};
 use crate::light_sampler::LightSampler;
 use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
 use irradiant_image::{Image, ReadOptions};
 use irradiant_scene::desc::{
-    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilterKind, FloatParam, MaterialKind, SceneDesc, ShapeDesc,
+    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilterKind, SceneDesc,
 };
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
@@ -94,11 +94,11 @@ fn compile(
     let sensor = sensor(&film, exposure_time.unwrap_or(1.0), space, diagnostics);
     let render_from_world = camera.as_ref().map(|c| c.render_from_world).unwrap_or_default();
 
-    let textures = Textures::compile(desc, &render_from_world, assets, space, diagnostics);
-    let materials = Materials::compile(desc, &textures, space, diagnostics);
+    let mut textures = Textures::compile(desc, &render_from_world, assets, space, diagnostics);
+    let materials = Materials::compile(desc, &mut textures, assets, space, diagnostics);
     let material_id = |m: irradiant_scene::desc::MaterialRef| MaterialId(m.0);
     let mut geometry = compile_geometry(desc, &render_from_world, material_id, diagnostics);
-    let lights = compile_lights(desc, &mut geometry, &textures, &render_from_world, space, assets, diagnostics);
+    let lights = compile_lights(desc, &mut geometry, &render_from_world, space, assets, diagnostics);
     if lights.is_empty() {
         diagnostics.push(
             Diagnostic::warning("W0501", "there is no light in the scene: the picture will be black", Span::NONE)
@@ -244,53 +244,20 @@ fn sensor(
 fn compile_lights(
     desc: &SceneDesc,
     geometry: &mut Geometry,
-    textures: &Textures,
     render_from_world: &irradiant_math::Transform,
     space: &'static ColorSpace,
     assets: &dyn Assets,
     diagnostics: &mut Diagnostics,
 ) -> Lights {
-    let shapes: Vec<&ShapeDesc> =
-        desc.shapes.iter().chain(desc.objects.iter().flat_map(|object| object.shapes.iter())).collect();
-    let mut area_emitters = Vec::new();
-    let mut light_of_emitter = Vec::new();
-    let mut warned = false;
-    for emitter in geometry.emitters() {
-        let shape = shapes[emitter.shape.0 as usize];
-        let material = &desc.materials[shape.material.0 as usize];
-        let interface = matches!(material.kind, MaterialKind::Interface);
-        if interface && !warned {
-            warned = true;
-            diagnostics.push(Diagnostic::warning(
-                "W0502",
-                "an area light on an interface is ignored, as pbrt does: there is no surface",
-                shape.span,
-            ));
-        }
-        let light = shape.area_light.as_ref().filter(|_| !interface).map(|light| {
-            let alpha = match emitter.alpha {
-                Alpha::Opaque => None,
-                Alpha::Constant(a) => Some(FloatParam::Value(a)),
-                Alpha::Texture(t) => Some(match textures.constant_float(t) {
-                    Some(value) => FloatParam::Value(value),
-                    None => FloatParam::Texture(t),
-                }),
-            };
-            let id = crate::interaction::LightId(area_emitters.len() as u32);
-            area_emitters.push(AreaEmitter { shape: emitter.geometry.clone(), desc: Arc::clone(light), alpha });
-            id
-        });
-        light_of_emitter.push(light);
-    }
-    geometry.assign_lights(light_of_emitter);
-    let mut load_image = |file: &Spanned<FileDesc>, diagnostics: &mut Diagnostics| load_image(file, assets, diagnostics);
+    let mut load_image =
+        |file: &Spanned<FileDesc>, diagnostics: &mut Diagnostics| load_image(file, assets, diagnostics);
     let mut context = LightContext {
         render_from_world,
         scene_bounds: geometry.bounds(),
         color_space: space,
         load_image: &mut load_image,
     };
-    Lights::compile(&desc.lights, area_emitters, &mut context, diagnostics)
+    Lights::compile(desc, geometry, &mut context, diagnostics)
 }
 
 /// Reads and decodes an image, or says where the scene asks for it and what is wrong.
