@@ -2,11 +2,12 @@
 //!
 //! # Layout
 //! In reading order: [`interaction`] (where a path met something), [`geometry`] (what rays meet),
-//! [`bxdf`] and [`bsdf`] (how light scatters there).
+//! [`bxdf`] and [`bsdf`] (how light scatters there), [`camera`] (where paths begin).
 //! Nothing here reads files, clocks or the environment.
 #![forbid(unsafe_code)]
 
 pub mod bsdf;
 pub mod bxdf;
+pub mod camera;
 pub mod geometry;
 pub mod interaction;
