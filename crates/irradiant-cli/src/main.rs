@@ -1,1 +1,54 @@
-fn main() {}
+//! The program `irradiant`. Each subcommand is a file; this one only routes.
+#![forbid(unsafe_code)]
+
+mod check;
+mod compare;
+mod exit;
+mod image;
+mod options;
+mod probe;
+mod progress;
+mod render;
+mod stats;
+
+use clap::{Parser, Subcommand};
+use exit::Exit;
+use std::process::ExitCode;
+
+/// Physically based path tracing: right, and provably so.
+///
+/// `irradiant render` without a scene renders the built-in Cornell box to cornell-box.exr and cornell-box.png.
+#[derive(Parser)]
+#[command(name = "irradiant", version, propagate_version = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(render::RenderArguments),
+    Check(check::CheckArguments),
+    Compare(compare::CompareArguments),
+    Probe(probe::ProbeArguments),
+    Image(image::ImageArguments),
+}
+
+fn main() -> ExitCode {
+    // Every bug that panics is reported as one, with its own exit code.
+    let default_hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        default_hook(info);
+        eprintln!("irradiant: this is a bug; please report it with the scene and the command");
+    }));
+    let arguments = Arguments::parse();
+    let run = || match arguments.command {
+        Command::Render(a) => render::run(&a),
+        Command::Check(a) => check::run(&a),
+        Command::Compare(a) => compare::run(&a),
+        Command::Probe(a) => probe::run(&a),
+        Command::Image(a) => image::run(&a),
+    };
+    let exit = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or(Exit::Bug);
+    ExitCode::from(exit as u8)
+}

@@ -6,6 +6,8 @@
 //! [`hash`], [`interval`] (rounding errors and ray origins), [`solve`]; [`warp`] (unit square to anything),
 //! [`distribution`] (tables), [`sequence`] (Sobol, Halton, Owen), [`noise`](mod@noise). Nothing here knows of light or of files.
 #![forbid(unsafe_code)]
+// `!(x > 0.0)` is how this house says "not positive, or NaN".
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 pub mod affine;
 pub mod bounds;

@@ -27,13 +27,28 @@ fn permute(i: usize) -> usize {
     PERMUTATION[i & 255] as usize
 }
 
+/// The gradients: a table, since the rule's branches are unpredictable (three times slower when measured).
+static GRADIENTS: [[f32; 3]; 16] = gradients();
+
+/// Two of three components are +-1: u from bit 0, v from bit 1.
+const fn gradients() -> [[f32; 3]; 16] {
+    let mut table = [[0.0; 3]; 16];
+    let mut h = 0;
+    while h < 16 {
+        let u = if h < 8 || h == 12 || h == 13 { 0 } else { 1 };
+        let v = if h < 4 || h == 12 || h == 13 { 1 } else { 2 };
+        table[h][u] = if h & 1 == 0 { 1.0 } else { -1.0 };
+        table[h][v] = if h & 2 == 0 { 1.0 } else { -1.0 };
+        h += 1;
+    }
+    table
+}
+
 /// The dot product of (dx, dy, dz) with the gradient of a lattice point, whose hash so far is `xy` (permuted x + y).
 #[inline]
 fn gradient(xy: usize, z: usize, dx: f32, dy: f32, dz: f32) -> f32 {
-    let h = permute(xy + z) & 15;
-    let u = if h < 8 || h == 12 || h == 13 { dx } else { dy };
-    let v = if h < 4 || h == 12 || h == 13 { dy } else { dz };
-    (if h & 1 == 0 { u } else { -u }) + (if h & 2 == 0 { v } else { -v })
+    let g = &GRADIENTS[permute(xy + z) & 15];
+    g[0] * dx + g[1] * dy + g[2] * dz
 }
 
 /// Splits a coordinate into its lattice cell (modulo 256) and the rest in [0, 1].

@@ -1,2 +1,19 @@
 //! What walks the scene: integrators, scheduling and sessions.
+//!
+//! # Layout
+//! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`record`] (what a path tells of
+//! itself), then [`schedule`] and [`session`]: which work, and who does it.
 #![forbid(unsafe_code)]
+
+pub mod ambient_occlusion;
+pub mod camera_samples;
+pub mod integrator;
+pub mod path;
+pub mod random_walk;
+pub mod record;
+pub mod schedule;
+pub mod session;
+pub mod simple_path;
+
+pub use integrator::{Integrator, Limit, RenderStats, WorkUnit};
+pub use session::{Progress, Session, SessionSettings};

@@ -263,7 +263,8 @@ mod tests {
 
     #[test]
     fn wrong_densities_are_caught() {
-        let wrong: [(&str, fn([f64; 3]) -> f64); 5] = [
+        type Density = fn([f64; 3]) -> f64;
+        let wrong: [(&str, Density); 5] = [
             ("10 % low", |d| 0.9 * d[2].max(0.0) * INV_PI),
             ("no cosine", |d| if d[2] > 0.0 { 0.5 * INV_PI } else { 0.0 }),
             ("twice", |d| 2.0 * d[2].max(0.0) * INV_PI),

@@ -202,14 +202,7 @@ impl CoatedDiffuse {
         (self.layers(&base).f(wo, wi, mode) + coat, self.walk_pdf(wo, wi))
     }
 
-    pub(super) fn sample(
-        &self,
-        wo: Vec3,
-        uc: f32,
-        u: Point2,
-        mode: TransportMode,
-        sides: Sides,
-    ) -> Option<BsdfSample> {
+    pub(super) fn sample(&self, wo: Vec3, uc: f32, u: Point2, mode: TransportMode, sides: Sides) -> Option<BsdfSample> {
         if !sides.reflection() {
             return None;
         }
@@ -443,14 +436,7 @@ impl CoatedConductor {
         self.coat.f_and_pdf(&self.base, &self.base.facets, wo, wi, mode)
     }
 
-    pub(super) fn sample(
-        &self,
-        wo: Vec3,
-        uc: f32,
-        u: Point2,
-        mode: TransportMode,
-        sides: Sides,
-    ) -> Option<BsdfSample> {
+    pub(super) fn sample(&self, wo: Vec3, uc: f32, u: Point2, mode: TransportMode, sides: Sides) -> Option<BsdfSample> {
         if !sides.reflection() {
             return None;
         }

@@ -84,7 +84,13 @@ impl Dielectric {
         }
         let reflection = co * ci > 0.0;
         // Walter's half vector: wo + wi, or wo + etap wi across the interface.
-        let etap = if reflection { 1.0 } else if co > 0.0 { self.eta } else { 1.0 / self.eta };
+        let etap = if reflection {
+            1.0
+        } else if co > 0.0 {
+            self.eta
+        } else {
+            1.0 / self.eta
+        };
         let h = wi * etap + wo;
         let length_squared = h.length_squared();
         if length_squared == 0.0 {
@@ -98,10 +104,8 @@ impl Dielectric {
             return (0.0, 0.0);
         }
         let fresnel = fresnel_dielectric(dot_o, self.eta);
-        let (pr, pt) = (
-            if sides.reflection() { fresnel } else { 0.0 },
-            if sides.transmission() { 1.0 - fresnel } else { 0.0 },
-        );
+        let (pr, pt) =
+            (if sides.reflection() { fresnel } else { 0.0 }, if sides.transmission() { 1.0 - fresnel } else { 0.0 });
         let d = self.facets.d(m);
         let (so, si) = (self.facets.stretch(wo), self.facets.stretch(wi));
         let (co, ci) = (co.abs(), ci.abs());
@@ -149,10 +153,8 @@ impl Dielectric {
         let specular = self.is_specular();
         let m = if specular { Vec3::Z } else { self.facets.sample_visible(wo, u) };
         let fresnel = if self.eta == 1.0 { 0.0 } else { fresnel_dielectric(wo.dot(m), self.eta) };
-        let (pr, pt) = (
-            if sides.reflection() { fresnel } else { 0.0 },
-            if sides.transmission() { 1.0 - fresnel } else { 0.0 },
-        );
+        let (pr, pt) =
+            (if sides.reflection() { fresnel } else { 0.0 }, if sides.transmission() { 1.0 - fresnel } else { 0.0 });
         if pr + pt == 0.0 {
             return None;
         }
@@ -192,14 +194,7 @@ impl Dielectric {
     }
 
     #[inline]
-    pub(super) fn sample(
-        &self,
-        wo: Vec3,
-        uc: f32,
-        u: Point2,
-        mode: TransportMode,
-        sides: Sides,
-    ) -> Option<BsdfSample> {
+    pub(super) fn sample(&self, wo: Vec3, uc: f32, u: Point2, mode: TransportMode, sides: Sides) -> Option<BsdfSample> {
         Some(self.sample_interface(wo, uc, u, mode, sides)?.to_bsdf_sample())
     }
 }
@@ -224,8 +219,7 @@ impl ThinDielectric {
         // R + T R T + T R^3 T + ... = 2 R / (1 + R).
         let r = 2.0 * single / (1.0 + single);
         let t = 1.0 - r;
-        let (pr, pt) =
-            (if sides.reflection() { r } else { 0.0 }, if sides.transmission() { t } else { 0.0 });
+        let (pr, pt) = (if sides.reflection() { r } else { 0.0 }, if sides.transmission() { t } else { 0.0 });
         if pr + pt == 0.0 {
             return None;
         }

@@ -83,11 +83,8 @@ impl DiffuseTransmission {
     pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3, sides: Sides) -> (SampledSpectrum, f32) {
         let reflection = self.reflection_probability(sides).unwrap_or(0.0);
         let transmission = if sides.transmission() && !self.transmittance.is_black() { 1.0 - reflection } else { 0.0 };
-        let (f, probability) = if wo.z * wi.z > 0.0 {
-            (self.reflectance, reflection)
-        } else {
-            (self.transmittance, transmission)
-        };
+        let (f, probability) =
+            if wo.z * wi.z > 0.0 { (self.reflectance, reflection) } else { (self.transmittance, transmission) };
         (f * FRAC_1_PI, probability * wi.z.abs() * FRAC_1_PI)
     }
 

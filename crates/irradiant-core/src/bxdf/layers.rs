@@ -215,8 +215,7 @@ impl<B: Base> Layers<'_, B> {
         if value == 0.0 {
             return 0.0;
         }
-        let weight =
-            if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, self.outward_density(w, wi, mode)) };
+        let weight = if pdf == f32::INFINITY { 1.0 } else { power_heuristic(pdf, self.outward_density(w, wi, mode)) };
         value * weight * transmitted
     }
 

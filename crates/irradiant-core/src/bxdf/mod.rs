@@ -18,9 +18,9 @@
 pub mod fresnel;
 pub mod microfacet;
 
-pub mod diffuse;
 pub mod conductor;
 pub mod dielectric;
+pub mod diffuse;
 
 pub mod coat;
 pub mod coated;

@@ -74,14 +74,7 @@ impl ThinFilmPaint {
         }
     }
 
-    pub(super) fn sample(
-        &self,
-        wo: Vec3,
-        uc: f32,
-        u: Point2,
-        mode: TransportMode,
-        sides: Sides,
-    ) -> Option<BsdfSample> {
+    pub(super) fn sample(&self, wo: Vec3, uc: f32, u: Point2, mode: TransportMode, sides: Sides) -> Option<BsdfSample> {
         if !sides.reflection() {
             return None;
         }

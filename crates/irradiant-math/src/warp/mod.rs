@@ -6,7 +6,7 @@
 //! multiplied). It knows nothing of light or shapes; visible microfacet normals live beside their model.
 //!
 //! # In reading order
-//! [`line`] (one dimension), [`plane`] (disks, triangles, bilinear), [`direction`] (spheres, cones, the equal-area square
+//! [`mod@line`] (one dimension), [`plane`] (disks, triangles, bilinear), [`direction`] (spheres, cones, the equal-area square
 //! map), [`spherical_polygon`] (triangles and rectangles seen from a point, by solid angle).
 //!
 //! # Sources

@@ -16,7 +16,7 @@ pub use film::{FilmDesc, FilmKind, FilterDesc, FilterKind};
 pub use light::{AreaLightDesc, LightDesc, LightKind, PortalDesc};
 pub use material::{MaterialDesc, MaterialKind, RoughnessDesc};
 pub use settings::{
-    IntegratorDesc, IntegratorKind, LightSamplerKind, OptionsDesc, RenderSpace, SamplerDesc, SamplerKind,
+    IntegratorDesc, IntegratorKind, LightSamplerKind, OptionsDesc, Randomization, RenderSpace, SamplerDesc, SamplerKind,
 };
 pub use shape::{CurveData, CurveStyle, MeshData, ShapeDesc, ShapeKind};
 pub use texture::{FloatTextureKind, ImageMapDesc, MappingDesc, SpectrumTextureKind, TextureDesc};

@@ -1,0 +1,163 @@
+//! Flags that several subcommands share, and how their values are read.
+
+use clap::Args;
+use irradiant::scene::desc::IntegratorKind;
+use irradiant::{ColorMode, MaxDepth, RenderSettings};
+use std::time::Duration;
+
+/// What determines the picture beside the scene.
+#[derive(Args, Clone, Debug)]
+pub struct PictureOptions {
+    /// Samples per pixel [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub spp: Option<u32>,
+    /// Seed of the random numbers; pictures of different seeds are independent
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
+    pub resolution: Option<[u32; 2]>,
+    /// The part to render, as fractions of width and height
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
+    pub crop: Option<Crop>,
+    /// path, simplepath, randomwalk or ambientocclusion [default: the scene's]
+    #[arg(long, value_name = "NAME", value_parser = parse_integrator)]
+    pub integrator: Option<IntegratorKind>,
+    /// Scattering events at most, or "none" for an unbiased picture [default: the scene's, else pbrt's 5]
+    #[arg(long, value_name = "N|none", value_parser = parse_max_depth)]
+    pub max_depth: Option<MaxDepth>,
+    /// Basis of colour
+    #[arg(long, value_name = "BASIS", value_enum, default_value = "spectral")]
+    pub color: Color,
+    /// Scene content that is not honoured is an error
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// `--color`
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Color {
+    /// Four wavelengths a path
+    Spectral,
+    /// Three numbers, faster; dispersion and measured spectra are approximated
+    Rgb,
+}
+
+/// Fractions x0, x1, y0, y1.
+#[derive(Clone, Copy, Debug)]
+pub struct Crop(pub [f32; 4]);
+
+impl PictureOptions {
+    /// As the library wants them.
+    pub fn settings(&self) -> RenderSettings {
+        RenderSettings {
+            samples_per_pixel: self.spp,
+            seed: self.seed,
+            resolution: self.resolution,
+            crop: self.crop.map(|c| c.0),
+            integrator: self.integrator,
+            max_depth: self.max_depth,
+            color: match self.color {
+                Color::Spectral => ColorMode::Spectral,
+                Color::Rgb => ColorMode::Rgb,
+            },
+            strict: self.strict,
+            ..RenderSettings::default()
+        }
+    }
+}
+
+fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', 'X']).ok_or("write it as WIDTHxHEIGHT, e.g. 1280x720")?;
+    let side = |s: &str| match s.trim().parse::<u32>() {
+        Ok(n @ 1..=65_536) => Ok(n),
+        Ok(n) => Err(format!("{n} is not between 1 and 65536")),
+        Err(_) => Err(format!("\"{s}\" is not a whole number")),
+    };
+    Ok([side(w)?, side(h)?])
+}
+
+fn parse_crop(text: &str) -> Result<Crop, String> {
+    let parts: Vec<f32> = text
+        .split(',')
+        .map(|s| s.trim().parse().map_err(|_| format!("\"{s}\" is not a number")))
+        .collect::<Result<_, _>>()?;
+    let [x0, x1, y0, y1] = parts[..] else {
+        return Err("write four fractions x0,x1,y0,y1, e.g. 0.25,0.75,0,0.5".into());
+    };
+    let valid = |a: f32, b: f32| (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b) && a < b;
+    if !(valid(x0, x1) && valid(y0, y1)) {
+        return Err("needs 0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1".into());
+    }
+    Ok(Crop([x0, x1, y0, y1]))
+}
+
+fn parse_integrator(text: &str) -> Result<IntegratorKind, String> {
+    let known = ["path", "simplepath", "randomwalk", "ambientocclusion"];
+    match text {
+        "path" => Ok(IntegratorKind::Path),
+        "simplepath" => Ok(IntegratorKind::SimplePath { sample_lights: true, sample_bsdf: true }),
+        "randomwalk" => Ok(IntegratorKind::RandomWalk),
+        "ambientocclusion" | "ao" => {
+            Ok(IntegratorKind::AmbientOcclusion { cos_sample: true, max_distance: f32::INFINITY })
+        }
+        _ => Err(match irradiant::scene::diagnostic::did_you_mean(text, known) {
+            Some(near) => format!("did you mean \"{near}\"?"),
+            None => format!("known are {}", known.join(", ")),
+        }),
+    }
+}
+
+fn parse_max_depth(text: &str) -> Result<MaxDepth, String> {
+    match text {
+        "none" => Ok(MaxDepth::None),
+        _ => text.parse().map(MaxDepth::Limit).map_err(|_| "a whole number or \"none\"".into()),
+    }
+}
+
+/// `90`, `90s`, `1.5m`, `2h`, `500ms`.
+pub fn parse_duration(text: &str) -> Result<Duration, String> {
+    let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let number: f64 = number.parse().map_err(|_| "write it as 60s, 5m, 1h or 500ms".to_string())?;
+    let seconds = match unit.trim() {
+        "" | "s" => number,
+        "ms" => number * 1e-3,
+        "m" | "min" => number * 60.0,
+        "h" => number * 3600.0,
+        other => return Err(format!("\"{other}\" is not a unit of time; use ms, s, m or h")),
+    };
+    if !(seconds > 0.0 && seconds < 1e9) {
+        return Err("must be more than zero".into());
+    }
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_have_units() {
+        assert_eq!(parse_duration("90").unwrap(), Duration::from_secs(90));
+        assert_eq!(parse_duration("1.5m").unwrap(), Duration::from_secs(90));
+        assert_eq!(parse_duration("250ms").unwrap(), Duration::from_millis(250));
+        for bad in ["", "x", "5 parsecs", "0s", "-3s"] {
+            assert!(parse_duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn values_are_checked_at_the_door() {
+        assert_eq!(parse_resolution("640x480").unwrap(), [640, 480]);
+        for bad in ["640", "0x5", "axb", "70000x1"] {
+            assert!(parse_resolution(bad).is_err(), "{bad}");
+        }
+        assert!(parse_crop("0,1,0,1").is_ok());
+        for bad in ["0,1,0", "1,0,0,1", "0,2,0,1", "0,x,0,1"] {
+            assert!(parse_crop(bad).is_err(), "{bad}");
+        }
+        assert_eq!(parse_integrator("pth").unwrap_err(), "did you mean \"path\"?");
+        assert_eq!(parse_max_depth("none").unwrap(), MaxDepth::None);
+    }
+}

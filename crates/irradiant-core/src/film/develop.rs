@@ -1,0 +1,75 @@
+//! From sums to an image of averages.
+
+use super::Film;
+use irradiant_image::Image;
+
+/// What to write beside radiance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DevelopOptions {
+    /// Channels `SE.R`, `SE.G`, `SE.B`: standard error of the mean as if samples were independent (low-discrepancy
+    /// samples usually do better).
+    pub standard_error: bool,
+    /// Channels `Variance.*` and `RelativeVariance.*` as pbrt's gbuffer film has them: sample variance, and that
+    /// over the squared mean.
+    pub variance: bool,
+}
+
+impl Film {
+    /// The image of averages: linear `R`, `G`, `B` in the film's colour space, then the layers, then error estimates.
+    pub fn develop(&self, options: DevelopOptions) -> Image {
+        let mut names: Vec<String> = ["R", "G", "B"].map(String::from).to_vec();
+        names.extend(self.layers.iter().flat_map(|l| l.channel_names()));
+        if options.variance {
+            for kind in ["Variance", "RelativeVariance"] {
+                names.extend(["R", "G", "B"].map(|c| format!("{kind}.{c}")));
+            }
+        }
+        if options.standard_error {
+            names.extend(["R", "G", "B"].map(|c| format!("SE.{c}")));
+        }
+        let bounds = self.bounds();
+        let n_layers = self.channels_per_pixel();
+        let mut samples = Vec::with_capacity(bounds.area() * names.len());
+        for (i, pixel) in self.tile.pixels.iter().enumerate() {
+            let mean = pixel.mean();
+            samples.extend(mean.map(|x| x as f32));
+            let n = pixel.count.max(1) as f64;
+            samples.extend(self.tile.layers[i * n_layers..(i + 1) * n_layers].iter().map(|s| (s.value() / n) as f32));
+            let variance = pixel.variance();
+            if options.variance {
+                samples.extend(variance.map(|v| v as f32));
+                samples.extend((0..3).map(|c| {
+                    let square = mean[c] * mean[c];
+                    if square > 0.0 { (variance[c] / square) as f32 } else { 0.0 }
+                }));
+            }
+            if options.standard_error {
+                samples.extend(variance.map(|v| (v / n).sqrt() as f32));
+            }
+        }
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        Image::from_f32(bounds.width(), bounds.height(), &names, samples)
+            .unwrap_or_else(|_| unreachable!("one sample per pixel and channel by construction"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{FilmTile, Layer, PixelBounds};
+    use super::*;
+
+    #[test]
+    fn averages_and_errors_come_out_under_pbrts_names() {
+        let bounds = PixelBounds { x0: 0, y0: 0, x1: 2, y1: 1 };
+        let mut film = Film::new([2, 1], bounds, vec![Layer::Uv]);
+        let mut tile = FilmTile::new(bounds, film.channels_per_pixel());
+        tile.add(1, 0, [1.0, 2.0, 4.0], &[0.5, 0.25]);
+        tile.add(1, 0, [3.0, 2.0, 0.0], &[0.5, 0.75]);
+        film.merge_tile(&tile);
+        let image = film.develop(DevelopOptions { standard_error: true, variance: true });
+        let at = |name: &str| image.get(1, 0, image.channels().iter().position(|c| c == name).unwrap());
+        assert_eq!((at("R"), at("G"), at("B"), at("u"), at("v")), (2.0, 2.0, 2.0, 0.5, 0.5));
+        assert_eq!((at("Variance.R"), at("RelativeVariance.B"), at("SE.R")), (2.0, 2.0, 1.0));
+        assert_eq!(image.get(0, 0, 0), 0.0);
+    }
+}

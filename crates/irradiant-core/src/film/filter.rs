@@ -1,0 +1,182 @@
+//! The pixel filter, by importance sampling: each sample falls into one pixel, at an offset drawn from |f|, and its
+//! weight has mean 1 (Ernst et al. 2006). Weights are exactly 1 for filters without negative lobes.
+
+use irradiant_math::elementary::{exp, sin};
+use irradiant_math::{Point2, warp};
+use irradiant_scene::desc::{FilterDesc, FilterKind};
+use std::f32::consts::PI;
+
+/// A pixel filter.
+#[derive(Clone, Debug)]
+pub enum Filter {
+    /// Constant within the radii.
+    Box {
+        /// Pixels.
+        radius: [f32; 2],
+    },
+    /// Tent.
+    Triangle {
+        /// Pixels.
+        radius: [f32; 2],
+    },
+    /// A product of two tabulated profiles.
+    Tabulated(Box<[Profile; 2]>),
+}
+
+/// An offset and its weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterSample {
+    /// From the pixel's centre, pixels.
+    pub offset: [f32; 2],
+    /// Filter over (density times the filter's integral); mean 1.
+    pub weight: f32,
+}
+
+const CELLS: usize = 1024;
+
+/// One dimension of a separable filter, constant in each of many cells.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    radius: f32,
+    cdf: Vec<f32>,
+    /// Sign over |f|'s share: the weight of a sample in a cell; +w or -w.
+    weight: Vec<f32>,
+}
+
+impl Profile {
+    fn new(radius: f32, f: impl Fn(f32) -> f32) -> Self {
+        let at = |i: usize| f(radius * (2.0 * (i as f32 + 0.5) / CELLS as f32 - 1.0)) as f64;
+        let values: Vec<f64> = (0..CELLS).map(at).collect();
+        let (sum, sum_abs) = values.iter().fold((0.0, 0.0), |(s, a), v| (s + v, a + v.abs()));
+        let mut cdf = Vec::with_capacity(CELLS + 1);
+        let mut running = 0.0;
+        cdf.push(0.0);
+        for v in &values {
+            running += v.abs();
+            cdf.push((running / sum_abs) as f32);
+        }
+        let magnitude = sum_abs / sum;
+        // All of one sign: exactly 1, whatever the rounding of the sums.
+        let magnitude = if values.iter().all(|v| *v >= 0.0) { 1.0 } else { magnitude as f32 };
+        let weight = values.iter().map(|v| if *v < 0.0 { -magnitude } else { magnitude }).collect();
+        Self { radius, cdf, weight }
+    }
+
+    fn sample(&self, u: f32) -> (f32, f32) {
+        let cell = self.cdf.partition_point(|c| *c <= u).clamp(1, CELLS) - 1;
+        let (lo, hi) = (self.cdf[cell], self.cdf[cell + 1]);
+        let within = if hi > lo { ((u - lo) / (hi - lo)).clamp(0.0, 1.0) } else { 0.5 };
+        (self.radius * (2.0 * (cell as f32 + within) / CELLS as f32 - 1.0), self.weight[cell])
+    }
+}
+
+impl Filter {
+    /// From its description, whose radii are positive and finite.
+    pub fn new(desc: &FilterDesc) -> Self {
+        let radius = [desc.x_radius.value, desc.y_radius.value];
+        let separable =
+            |f: &dyn Fn(f32, f32) -> f32| Self::Tabulated(Box::new(radius.map(|r| Profile::new(r, |x| f(x, r)))));
+        match desc.kind {
+            FilterKind::Box => Self::Box { radius },
+            FilterKind::Triangle => Self::Triangle { radius },
+            FilterKind::Gaussian { sigma } => {
+                let s = sigma.value;
+                let g = |x: f32| exp(-x * x / (2.0 * s * s));
+                separable(&|x, r| (g(x) - g(r)).max(0.0))
+            }
+            FilterKind::Mitchell { b, c } => separable(&|x, r| mitchell(2.0 * x / r, b.value, c.value)),
+            FilterKind::Sinc { tau } => separable(&|x, _| sinc(x) * sinc(x / tau.value)),
+        }
+    }
+
+    /// An offset by two numbers in [0, 1).
+    #[inline]
+    pub fn sample(&self, u: Point2) -> FilterSample {
+        match self {
+            Self::Box { radius } => {
+                FilterSample { offset: [radius[0] * (2.0 * u.x - 1.0), radius[1] * (2.0 * u.y - 1.0)], weight: 1.0 }
+            }
+            Self::Triangle { radius } => {
+                FilterSample { offset: [warp::tent(u.x, radius[0]), warp::tent(u.y, radius[1])], weight: 1.0 }
+            }
+            Self::Tabulated(profiles) => {
+                let ((x, wx), (y, wy)) = (profiles[0].sample(u.x), profiles[1].sample(u.y));
+                FilterSample { offset: [x, y], weight: wx * wy }
+            }
+        }
+    }
+}
+
+fn sinc(x: f32) -> f32 {
+    let x = PI * x;
+    if x.abs() < 1e-4 { 1.0 } else { sin(x) / x }
+}
+
+/// Mitchell and Netravali 1988, support [-2, 2].
+fn mitchell(x: f32, b: f32, c: f32) -> f32 {
+    let x = x.abs();
+    if x <= 1.0 {
+        ((12.0 - 9.0 * b - 6.0 * c) * x * x * x + (-18.0 + 12.0 * b + 6.0 * c) * x * x + (6.0 - 2.0 * b)) / 6.0
+    } else if x <= 2.0 {
+        ((-b - 6.0 * c) * x * x * x + (6.0 * b + 30.0 * c) * x * x + (-12.0 * b - 48.0 * c) * x + (8.0 * b + 24.0 * c))
+            / 6.0
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use irradiant_scene::{Span, Spanned};
+
+    fn filter(kind: FilterKind, radius: f32) -> Filter {
+        let r = Spanned::unplaced(radius);
+        Filter::new(&FilterDesc { kind, x_radius: r, y_radius: r, span: Span::NONE })
+    }
+
+    /// One dimension by a regular grid of u; the other's weight is divided out. The grid's error is about 1e-3.
+    #[test]
+    fn weights_have_mean_one_and_moments_match_quadrature() {
+        let s = |x: f32| Spanned::unplaced(x);
+        let third = s(1.0 / 3.0);
+        type Shape<'a> = &'a dyn Fn(f32) -> f32;
+        let cases: [(FilterKind, f32, Shape); 5] = [
+            (FilterKind::Box, 0.5, &|_| 1.0),
+            (FilterKind::Triangle, 2.0, &|x| 2.0 - x.abs()),
+            (FilterKind::Gaussian { sigma: s(0.5) }, 1.5, &|x| exp(-2.0 * x * x) - exp(-4.5)),
+            (FilterKind::Mitchell { b: third, c: third }, 2.0, &|x| mitchell(x, 1.0 / 3.0, 1.0 / 3.0)),
+            (FilterKind::Sinc { tau: s(3.0) }, 4.0, &|x| sinc(x) * sinc(x / 3.0)),
+        ];
+        for (kind, radius, f) in cases {
+            let filter = filter(kind, radius);
+            let n = 20_000;
+            let grid = |i: usize| (i as f32 + 0.5) / n as f32;
+            let (mut mean, mut second, mut area, mut moment) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            // At the centre in y the weight is the positive one, whose square root is one dimension's.
+            let one_dimension = filter.sample(Point2::new(0.5, 0.5)).weight.sqrt();
+            for i in 0..n {
+                let sample = filter.sample(Point2::new(grid(i), 0.5));
+                assert!(sample.offset[0].abs() <= radius);
+                let w = (sample.weight / one_dimension) as f64;
+                mean += w;
+                second += w * (sample.offset[0] * sample.offset[0]) as f64;
+                let x = radius * (2.0 * grid(i) - 1.0);
+                area += f(x) as f64;
+                moment += (f(x) * x * x) as f64;
+            }
+            let n = n as f64;
+            assert!((mean / n - 1.0).abs() < 2e-3, "{kind:?}: mean weight {}", mean / n);
+            let (got, expected) = (second / n, moment / area);
+            assert!((got - expected).abs() < 5e-3 * radius as f64, "{kind:?}: second moment {got}, {expected}");
+        }
+    }
+
+    #[test]
+    fn positive_filters_have_weight_exactly_one() {
+        let filter = filter(FilterKind::Gaussian { sigma: Spanned::unplaced(0.5) }, 1.5);
+        for i in 0..100 {
+            assert_eq!(filter.sample(Point2::new(i as f32 / 100.0, 0.7)).weight, 1.0);
+        }
+    }
+}

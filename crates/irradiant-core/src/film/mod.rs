@@ -1,0 +1,429 @@
+//! The film: sums and counts per pixel. Averages exist only in [`Film::develop`].
+//!
+//! There is one film. What varies is which layers it keeps beside radiance ([`Layer`]). Each sample touches exactly
+//! one pixel (reconstruction by filter importance sampling; Ernst et al. 2006), so a tile has one writer.
+
+mod develop;
+pub mod exact;
+pub mod filter;
+
+pub use develop::DevelopOptions;
+
+use exact::{ExactSum, SquareSum};
+
+/// What a film keeps beside radiance, channel by channel; all are means over the pixel's samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Layer {
+    /// Reflectance at the first visible surface (R, G, B).
+    Albedo,
+    /// Position of the first hit (X, Y, Z).
+    Position,
+    /// Change of the first hit's depth per pixel (x, y).
+    DepthSlope,
+    /// Geometric normal of the first hit.
+    Normal,
+    /// Shading normal of the first hit.
+    ShadingNormal,
+    /// Texture coordinates of the first hit (u, v).
+    Uv,
+    /// Radiance averaged over a wavelength interval; one channel.
+    Bucket {
+        /// Least wavelength, nm.
+        lambda_min: f32,
+        /// Greatest wavelength, nm.
+        lambda_max: f32,
+    },
+}
+
+impl Layer {
+    /// Number of channels.
+    pub const fn n_channels(&self) -> usize {
+        match self {
+            Self::Albedo | Self::Position | Self::Normal | Self::ShadingNormal => 3,
+            Self::DepthSlope | Self::Uv => 2,
+            Self::Bucket { .. } => 1,
+        }
+    }
+
+    /// Channel names as pbrt-v4 writes them.
+    pub fn channel_names(&self) -> Vec<String> {
+        let names = |list: &[&str]| list.iter().map(|s| s.to_string()).collect();
+        match self {
+            Self::Albedo => names(&["Albedo.R", "Albedo.G", "Albedo.B"]),
+            Self::Position => names(&["P.X", "P.Y", "P.Z"]),
+            Self::DepthSlope => names(&["dzdx", "dzdy"]),
+            Self::Normal => names(&["N.X", "N.Y", "N.Z"]),
+            Self::ShadingNormal => names(&["Ns.X", "Ns.Y", "Ns.Z"]),
+            Self::Uv => names(&["u", "v"]),
+            Self::Bucket { lambda_min, lambda_max } => {
+                vec![format!("S0.{:.3}nm", 0.5 * (lambda_min + lambda_max)).replace('.', ",").replacen("S0,", "S0.", 1)]
+            }
+        }
+    }
+}
+
+/// Pixels as integer rectangles, end-exclusive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelBounds {
+    /// Least x.
+    pub x0: i32,
+    /// Least y.
+    pub y0: i32,
+    /// One past the greatest x.
+    pub x1: i32,
+    /// One past the greatest y.
+    pub y1: i32,
+}
+
+impl PixelBounds {
+    /// Pixels across.
+    pub const fn width(&self) -> usize {
+        if self.x1 > self.x0 { (self.x1 - self.x0) as usize } else { 0 }
+    }
+
+    /// Pixels down.
+    pub const fn height(&self) -> usize {
+        if self.y1 > self.y0 { (self.y1 - self.y0) as usize } else { 0 }
+    }
+
+    /// Number of pixels.
+    pub const fn area(&self) -> usize {
+        self.width() * self.height()
+    }
+
+    /// The part inside another rectangle.
+    pub fn intersection(&self, b: &Self) -> Self {
+        Self { x0: self.x0.max(b.x0), y0: self.y0.max(b.y0), x1: self.x1.min(b.x1), y1: self.y1.min(b.y1) }
+    }
+
+    /// True when the pixel is inside.
+    pub const fn contains(&self, x: i32, y: i32) -> bool {
+        self.x0 <= x && x < self.x1 && self.y0 <= y && y < self.y1
+    }
+}
+
+/// Sums and counts of one pixel: 112 bytes, so that a 4K film with error bars stays under 1 GB.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pixel {
+    /// Weighted radiance, linear RGB of the film's colour space.
+    pub radiance: [ExactSum; 3],
+    /// Its squares.
+    pub squares: [SquareSum; 3],
+    /// Samples summed.
+    pub count: u32,
+    /// Samples refused: not finite.
+    pub not_finite: u32,
+    /// Samples refused: finite but beyond the range of the sums.
+    pub out_of_range: u32,
+    /// Samples summed whose square was beyond the range: the pixel's error bar is unknown.
+    pub square_overflow: u32,
+}
+
+impl Pixel {
+    /// Adds a weighted sample; false when it was refused (and counted).
+    #[inline]
+    pub fn add(&mut self, rgb: [f32; 3]) -> bool {
+        let quantised = rgb.map(ExactSum::quantised);
+        let [Some(r), Some(g), Some(b)] = quantised else {
+            if rgb.iter().all(|x| x.is_finite()) {
+                self.out_of_range += 1;
+            } else {
+                self.not_finite += 1;
+            }
+            return false;
+        };
+        self.radiance[0] += r;
+        self.radiance[1] += g;
+        self.radiance[2] += b;
+        let mut in_range = true;
+        for c in 0..3 {
+            in_range &= self.squares[c].add(rgb[c]);
+        }
+        self.square_overflow += u32::from(!in_range);
+        self.count += 1;
+        true
+    }
+
+    /// Adds another pixel's sums: associative, commutative, with the empty pixel as identity.
+    #[inline]
+    pub fn merge(&mut self, other: &Pixel) {
+        for c in 0..3 {
+            self.radiance[c] += other.radiance[c];
+            self.squares[c] += other.squares[c];
+        }
+        self.count += other.count;
+        self.not_finite += other.not_finite;
+        self.out_of_range += other.out_of_range;
+        self.square_overflow += other.square_overflow;
+    }
+
+    /// Mean radiance; zero without samples.
+    pub fn mean(&self) -> [f64; 3] {
+        let n = self.count.max(1) as f64;
+        self.radiance.map(|sum| sum.value() / n)
+    }
+
+    /// Sample variance of one sample (unbiased); infinite when unknown, zero for fewer than two samples.
+    pub fn variance(&self) -> [f64; 3] {
+        let n = self.count as f64;
+        if self.square_overflow > 0 {
+            return [f64::INFINITY; 3];
+        }
+        if self.count < 2 {
+            return [0.0; 3];
+        }
+        std::array::from_fn(|c| {
+            let (sum, square) = (self.radiance[c].value(), self.squares[c].value());
+            ((square - sum * sum / n) / (n - 1.0)).max(0.0)
+        })
+    }
+}
+
+/// A part of a film: what a work unit fills, and what a film is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmTile {
+    bounds: PixelBounds,
+    pixels: Vec<Pixel>,
+    layers: Vec<ExactSum>,
+    channels_per_pixel: usize,
+}
+
+impl FilmTile {
+    /// An empty tile.
+    pub fn new(bounds: PixelBounds, channels_per_pixel: usize) -> Self {
+        Self {
+            bounds,
+            pixels: vec![Pixel::default(); bounds.area()],
+            layers: vec![ExactSum::default(); bounds.area() * channels_per_pixel],
+            channels_per_pixel,
+        }
+    }
+
+    /// Its pixels' place in the image.
+    pub fn bounds(&self) -> PixelBounds {
+        self.bounds
+    }
+
+    fn index(&self, x: i32, y: i32) -> usize {
+        debug_assert!(self.bounds.contains(x, y));
+        (y - self.bounds.y0) as usize * self.bounds.width() + (x - self.bounds.x0) as usize
+    }
+
+    /// A pixel.
+    #[inline]
+    pub fn pixel(&self, x: i32, y: i32) -> &Pixel {
+        &self.pixels[self.index(x, y)]
+    }
+
+    /// Adds a sample to a pixel: weighted radiance, and the layers' channels (which need not be finite: those that
+    /// are not, or out of range, count as 0).
+    #[inline]
+    pub fn add(&mut self, x: i32, y: i32, rgb: [f32; 3], layers: &[f32]) -> bool {
+        let i = self.index(x, y);
+        let accepted = self.pixels[i].add(rgb);
+        if accepted && self.channels_per_pixel > 0 {
+            let at = i * self.channels_per_pixel;
+            for (sum, &value) in self.layers[at..at + self.channels_per_pixel].iter_mut().zip(layers) {
+                let _ = sum.add(value);
+            }
+        }
+        accepted
+    }
+
+    /// Adds the sums of a tile of the same bounds and layers.
+    pub fn merge(&mut self, other: &FilmTile) {
+        debug_assert_eq!((self.bounds, self.channels_per_pixel), (other.bounds, other.channels_per_pixel));
+        for (a, b) in self.pixels.iter_mut().zip(&other.pixels) {
+            a.merge(b);
+        }
+        for (a, b) in self.layers.iter_mut().zip(&other.layers) {
+            *a += *b;
+        }
+    }
+
+    /// All zero again, for other pixels of the same number; storage kept.
+    pub fn restart(&mut self, bounds: PixelBounds) {
+        debug_assert_eq!(bounds.area(), self.bounds.area());
+        self.bounds = bounds;
+        self.pixels.fill(Pixel::default());
+        self.layers.fill(ExactSum::default());
+    }
+}
+
+/// Totals over a film, for reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FilmTotals {
+    /// Samples summed.
+    pub samples: u64,
+    /// Samples refused because not finite.
+    pub not_finite: u64,
+    /// Samples refused because out of range.
+    pub out_of_range: u64,
+    /// Pixels with at least one refused sample.
+    pub pixels_with_refused: u64,
+    /// Fewest samples in a pixel.
+    pub min_count: u32,
+    /// Most samples in a pixel.
+    pub max_count: u32,
+    /// Standard error of the picture relative to its mean, estimated as if samples were independent.
+    pub relative_error: f64,
+}
+
+/// A whole film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    full_resolution: [u32; 2],
+    tile: FilmTile,
+    layers: Vec<Layer>,
+}
+
+impl Film {
+    /// An empty film for the pixels `bounds` of an image of `full_resolution`.
+    pub fn new(full_resolution: [u32; 2], bounds: PixelBounds, layers: Vec<Layer>) -> Self {
+        let channels = layers.iter().map(Layer::n_channels).sum();
+        Self { full_resolution, tile: FilmTile::new(bounds, channels), layers }
+    }
+
+    /// Width and height of the image that this is a (perhaps cropped) film of.
+    pub fn full_resolution(&self) -> [u32; 2] {
+        self.full_resolution
+    }
+
+    /// The pixels that this film holds.
+    pub fn bounds(&self) -> PixelBounds {
+        self.tile.bounds
+    }
+
+    /// The layers beside radiance.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// Channels of all layers together.
+    pub fn channels_per_pixel(&self) -> usize {
+        self.tile.channels_per_pixel
+    }
+
+    /// A pixel's sums.
+    pub fn pixel(&self, x: i32, y: i32) -> &Pixel {
+        self.tile.pixel(x, y)
+    }
+
+    /// Adds the sums of a tile that lies inside.
+    pub fn merge_tile(&mut self, tile: &FilmTile) {
+        debug_assert_eq!(self.tile.channels_per_pixel, tile.channels_per_pixel);
+        let n = self.tile.channels_per_pixel;
+        for y in tile.bounds.y0..tile.bounds.y1 {
+            let (from, to) = (tile.index(tile.bounds.x0, y), self.tile.index(tile.bounds.x0, y));
+            for i in 0..tile.bounds.width() {
+                self.tile.pixels[to + i].merge(&tile.pixels[from + i]);
+            }
+            for i in 0..tile.bounds.width() * n {
+                self.tile.layers[to * n + i] += tile.layers[from * n + i];
+            }
+        }
+    }
+
+    /// Adds the sums of another film of the same pixels and layers (other samples of the same picture).
+    pub fn merge(&mut self, other: &Film) -> Result<(), FilmMismatch> {
+        if self.full_resolution != other.full_resolution
+            || self.layers != other.layers
+            || self.bounds() != other.bounds()
+        {
+            return Err(FilmMismatch);
+        }
+        self.tile.merge(&other.tile);
+        Ok(())
+    }
+
+    /// Totals for reports.
+    pub fn totals(&self) -> FilmTotals {
+        let mut totals = FilmTotals { min_count: u32::MAX, ..Default::default() };
+        let (mut mean, mut error_squared) = (0.0, 0.0);
+        for pixel in &self.tile.pixels {
+            totals.samples += pixel.count as u64;
+            totals.not_finite += pixel.not_finite as u64;
+            totals.out_of_range += pixel.out_of_range as u64;
+            totals.pixels_with_refused += u64::from(pixel.not_finite + pixel.out_of_range > 0);
+            totals.min_count = totals.min_count.min(pixel.count);
+            totals.max_count = totals.max_count.max(pixel.count);
+            mean += pixel.mean().iter().sum::<f64>();
+            error_squared += pixel.variance().iter().filter(|v| v.is_finite()).sum::<f64>() / pixel.count.max(1) as f64;
+        }
+        let n = 3.0 * self.tile.pixels.len().max(1) as f64;
+        let (mean, error) = (mean / n, (error_squared / n).sqrt());
+        totals.relative_error = if mean > 0.0 { error / mean } else { 0.0 };
+        totals.min_count = totals.min_count.min(totals.max_count);
+        totals
+    }
+}
+
+/// Two films hold different pixels or layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FilmMismatch;
+
+impl std::fmt::Display for FilmMismatch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "the films differ in resolution, pixel bounds or layers")
+    }
+}
+
+impl std::error::Error for FilmMismatch {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOUNDS: PixelBounds = PixelBounds { x0: 2, y0: 1, x1: 5, y1: 4 };
+
+    fn film() -> Film {
+        Film::new([8, 8], BOUNDS, vec![Layer::Uv])
+    }
+
+    #[test]
+    fn merging_is_associative_and_commutative_with_an_identity() {
+        let fill = |seed: u32| {
+            let mut f = film();
+            for i in 0..50u32 {
+                let h = i.wrapping_mul(2_654_435_761).wrapping_add(seed.wrapping_mul(97));
+                let (x, y) = (2 + (h >> 8) as i32 % 3, 1 + (h >> 16) as i32 % 3);
+                let (x, y) = (x.clamp(2, 4), y.clamp(1, 3));
+                f.tile.add(x, y, [h as f32 * 1e-9, 0.1, h as f32], &[0.25, 1e-3 * i as f32]);
+            }
+            f
+        };
+        let (a, b, c) = (fill(1), fill(2), fill(3));
+        let sum = |list: &[&Film]| {
+            let mut total = film();
+            list.iter().for_each(|f| total.merge(f).unwrap());
+            total
+        };
+        let ab = sum(&[&a, &b]);
+        assert_eq!(sum(&[&ab, &c]), sum(&[&a, &sum(&[&c, &b])]));
+        assert_eq!(sum(&[&a, &film()]), a);
+        assert!(a.clone().merge(&Film::new([8, 8], BOUNDS, vec![])).is_err());
+    }
+
+    #[test]
+    fn refused_samples_are_counted_and_leave_the_sums_alone() {
+        let mut pixel = Pixel::default();
+        assert!(pixel.add([1.0, 2.0, 3.0]));
+        assert!(!pixel.add([1.0, f32::NAN, 3.0]));
+        assert!(!pixel.add([1e30, 2.0, 3.0]));
+        assert!(pixel.add([1e10, 2.0, 3.0]));
+        assert_eq!((pixel.count, pixel.not_finite, pixel.out_of_range, pixel.square_overflow), (2, 1, 1, 1));
+        assert_eq!(pixel.mean()[2], 3.0);
+        assert_eq!(pixel.variance()[2], f64::INFINITY);
+    }
+
+    #[test]
+    fn variance_is_the_sample_variance() {
+        let mut pixel = Pixel::default();
+        for x in [1.0, 2.0, 4.0] {
+            pixel.add([x, 0.5, 0.0]);
+        }
+        let v = pixel.variance();
+        assert!((v[0] - 7.0 / 3.0).abs() < 1e-12 && v[1].abs() < 1e-12);
+        assert_eq!(size_of::<Pixel>(), 112);
+    }
+}

@@ -1,0 +1,137 @@
+//! Which layers a film keeps, and how samples fill them.
+
+use super::Scene;
+use crate::bsdf::Bsdf;
+use crate::camera::CameraRay;
+use crate::film::Layer;
+use crate::interaction::{Interaction, TextureContext};
+use irradiant_math::{Affine, Transform};
+use irradiant_scene::desc::{FilmDesc, FilmKind};
+use irradiant_spectrum::{LAMBDA_MAX, LAMBDA_MIN, SampledSpectrum, Wavelengths};
+
+/// The layers of one film.
+#[derive(Clone, Debug)]
+pub struct LayerPlan {
+    layers: Vec<Layer>,
+    channels: usize,
+    has_geometry: bool,
+    /// Geometry layers' space from render space.
+    space_from_render: Affine,
+    first_bucket: usize,
+    n_buckets: usize,
+    lambda_range: [f32; 2],
+    /// Write variances too.
+    pub variance: bool,
+}
+
+impl LayerPlan {
+    /// For a film. `camera_from_render` and `world_from_render` are at shutter opening.
+    pub fn new(film: &FilmDesc, camera_from_render: &Transform, world_from_render: &Transform) -> Self {
+        let mut layers = Vec::new();
+        let mut lambda_range = [LAMBDA_MIN, LAMBDA_MAX];
+        let mut space = world_from_render;
+        match &film.kind {
+            FilmKind::Rgb => {}
+            FilmKind::Gbuffer { camera_space } => {
+                layers = vec![
+                    Layer::Albedo,
+                    Layer::Position,
+                    Layer::DepthSlope,
+                    Layer::Normal,
+                    Layer::ShadingNormal,
+                    Layer::Uv,
+                ];
+                if *camera_space {
+                    space = camera_from_render;
+                }
+            }
+            FilmKind::Spectral { n_buckets, lambda_min, lambda_max } => {
+                lambda_range = [lambda_min.value, lambda_max.value];
+                let width = (lambda_max.value - lambda_min.value) / n_buckets.value as f32;
+                layers.extend((0..n_buckets.value).map(|i| Layer::Bucket {
+                    lambda_min: lambda_min.value + i as f32 * width,
+                    lambda_max: lambda_min.value + (i + 1) as f32 * width,
+                }));
+            }
+        }
+        let n_buckets = layers.iter().filter(|l| matches!(l, Layer::Bucket { .. })).count();
+        let channels = layers.iter().map(Layer::n_channels).sum();
+        Self {
+            has_geometry: layers.len() > n_buckets,
+            first_bucket: channels - n_buckets,
+            layers,
+            channels,
+            space_from_render: Affine::from(space),
+            n_buckets,
+            lambda_range,
+            variance: matches!(film.kind, FilmKind::Gbuffer { .. }),
+        }
+    }
+
+    /// The layers, in the order of their channels.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Wavelengths of a path: where the eye sees, or, for a spectral film, evenly over its range.
+    #[inline]
+    pub fn sample_wavelengths(&self, u: f32) -> Wavelengths {
+        if self.n_buckets == 0 {
+            Wavelengths::sample_visible(u)
+        } else {
+            Wavelengths::sample_uniform(u, self.lambda_range[0], self.lambda_range[1])
+        }
+    }
+
+    /// Fills the geometry layers from the first surface.
+    pub fn fill(
+        &self,
+        values: &mut [f32],
+        scene: &Scene,
+        camera_ray: &CameraRay,
+        at: &Interaction,
+        footprint: &TextureContext,
+        bsdf: &Bsdf,
+        lambda: &Wavelengths,
+    ) {
+        if !self.has_geometry {
+            return;
+        }
+        // Reflectance as the film would show it under white light.
+        let albedo = scene.film_rgb(bsdf.albedo(at.wo) * scene.white(lambda), lambda);
+        let space = &self.space_from_render;
+        let p = space.point(at.p);
+        let slope = camera_ray.depth_slope(at, space);
+        let n = space.normal(at.n).normalize();
+        let ns = space.normal(at.ns).normalize();
+        let all = [
+            albedo[0], albedo[1], albedo[2], p.x, p.y, p.z, slope[0], slope[1], n.x, n.y, n.z, ns.x, ns.y, ns.z, footprint.uv.x,
+            footprint.uv.y,
+        ];
+        values[..all.len()].copy_from_slice(&all);
+    }
+
+    /// Adds a sample's radiance to the buckets that its wavelengths fall in. The mean of a bucket estimates the mean
+    /// radiance over its interval, W m^-2 sr^-1 nm^-1.
+    #[inline]
+    pub fn add_buckets(&self, radiance: SampledSpectrum, lambda: &Wavelengths, values: &mut [f32]) {
+        if self.n_buckets == 0 || lambda.basis == irradiant_spectrum::Basis::Rgb {
+            return;
+        }
+        let [lo, hi] = self.lambda_range;
+        let width = (hi - lo) / self.n_buckets as f32;
+        let n = lambda.lambda.len() as f32;
+        for i in 0..lambda.lambda.len() {
+            let pdf = lambda.pdf[i];
+            let bucket = ((lambda.lambda[i] - lo) / width) as usize;
+            if pdf > 0.0 && bucket < self.n_buckets {
+                values[self.first_bucket + bucket] += radiance[i] / (pdf * n * width);
+            }
+        }
+    }
+}

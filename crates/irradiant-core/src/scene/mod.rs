@@ -1,0 +1,173 @@
+//! The compiled scene: immutable, shared by threads, walked by integrators.
+//!
+//! [`Scene::compile`] makes it from a description, once; range checks happen there, so that rendering has no error
+//! paths. Afterwards everything is an array reached by an id.
+
+mod compile;
+mod facts;
+mod layers;
+
+pub use compile::{CompileOptions, Compiled};
+pub use facts::Facts;
+pub use layers::LayerPlan;
+
+use crate::camera::{Camera, CameraRay, FootprintEstimator};
+use crate::film::filter::Filter;
+use crate::film::{Film, PixelBounds};
+use crate::geometry::{AlphaTest, Geometry};
+use crate::interaction::{Interaction, MaterialId, TextureContext};
+use crate::light::{LightSample, Lights};
+use crate::light_sampler::LightSampler;
+use crate::material::Materials;
+use crate::sampler::Sampler;
+use crate::texture::{FloatValue, Textures};
+use irradiant_math::{Point2, Transform};
+use irradiant_spectrum::{Basis, ColorSpace, SampledSpectrum, Sensor, Spectrum, Wavelengths};
+
+/// Everything that a sample is a function of, but its pixel and index and the integrator.
+pub struct Scene {
+    /// What rays meet.
+    pub geometry: Geometry,
+    /// How it scatters.
+    pub materials: Materials,
+    /// What varies over it.
+    pub textures: Textures,
+    /// What shines.
+    pub lights: Lights,
+    /// Which light to ask.
+    pub light_sampler: LightSampler,
+    /// Where rays come from.
+    pub camera: Camera,
+    /// How samples weigh in a pixel.
+    pub filter: Filter,
+    /// Random numbers.
+    pub sampler: Sampler,
+    /// What the film keeps beside radiance.
+    pub layers: LayerPlan,
+    /// Samples per pixel.
+    pub samples_per_pixel: u32,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    basis: Basis,
+    sensor: Sensor,
+    color_space: &'static ColorSpace,
+    rgb_from_sensor: [[f32; 3]; 3],
+    max_component: f32,
+    white: Spectrum,
+    resolution: [u32; 2],
+    bounds: PixelBounds,
+    footprint: Option<FootprintEstimator>,
+    render_from_world: Transform,
+    camera_from_world: Transform,
+    pixel_jitter: bool,
+    wavelength_jitter: bool,
+    limits: Vec<String>,
+    facts: Facts,
+}
+
+/// Decides alpha tests with the scene's textures.
+pub struct SceneAlpha<'a>(&'a Textures);
+
+impl AlphaTest for SceneAlpha<'_> {
+    #[inline]
+    fn alpha(&self, value: FloatValue, at: &TextureContext) -> f32 {
+        self.0.float(value, at)
+    }
+}
+
+impl Scene {
+    /// An empty film for this scene.
+    pub fn new_film(&self) -> Film {
+        Film::new(self.resolution, self.bounds, self.layers.layers().to_vec())
+    }
+
+    /// The alpha test for rays.
+    #[inline]
+    pub fn alpha(&self) -> SceneAlpha<'_> {
+        SceneAlpha(&self.textures)
+    }
+
+    /// Wavelengths of a path.
+    #[inline]
+    pub fn sample_wavelengths(&self, u: f32) -> Wavelengths {
+        match self.basis {
+            Basis::Spectral if self.wavelength_jitter => self.layers.sample_wavelengths(u),
+            Basis::Spectral => self.layers.sample_wavelengths(0.5),
+            Basis::Rgb => Wavelengths::rgb(),
+        }
+    }
+
+    /// The pixel filter's random numbers, or the pixel's centre where jitter is switched off.
+    #[inline]
+    pub fn film_draw(&self, u: Point2) -> Point2 {
+        if self.pixel_jitter { u } else { Point2::new(0.5, 0.5) }
+    }
+
+    /// What the sensor makes of radiance: linear RGB of the film's colour space.
+    #[inline]
+    pub fn film_rgb(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
+        let mut sensor = self.sensor.to_rgb(radiance, lambda);
+        if self.max_component.is_finite() {
+            // Asked for by the scene; labelled as biased in the header.
+            let most = sensor[0].max(sensor[1]).max(sensor[2]);
+            if most > self.max_component {
+                sensor = sensor.map(|c| c * (self.max_component / most));
+            }
+        }
+        let m = &self.rgb_from_sensor;
+        std::array::from_fn(|i| m[i][0] * sensor[0] + m[i][1] * sensor[1] + m[i][2] * sensor[2])
+    }
+
+    /// The spectrum that the film shows as (1, 1, 1).
+    #[inline]
+    pub fn white(&self, lambda: &Wavelengths) -> SampledSpectrum {
+        self.white.sample(lambda)
+    }
+
+    /// The film's colour space.
+    pub fn color_space(&self) -> &'static ColorSpace {
+        self.color_space
+    }
+
+    /// How a hit looks to textures. At the first hit the camera ray's differentials say how far apart neighbouring
+    /// pixels' hits are; elsewhere it is estimated from the distance to the camera.
+    #[inline]
+    pub fn texture_context(&self, at: &Interaction, camera_ray: Option<&CameraRay>) -> TextureContext {
+        match &self.footprint {
+            None => TextureContext::point(at),
+            Some(estimator) => estimator.texture_context(at, camera_ray),
+        }
+    }
+
+    /// True when something stands between a surface point and the end of a light sample.
+    #[inline]
+    pub fn is_occluded(&self, at: &Interaction, sample: &LightSample) -> bool {
+        let (ray, t_max) = at.shadow_ray(sample.wi, &sample.target);
+        self.geometry.occluded(&ray, t_max, &self.alpha())
+    }
+
+    /// World from render space.
+    pub fn world_from_render(&self) -> Transform {
+        self.render_from_world.inverse()
+    }
+
+    /// World to camera at shutter opening as OpenEXR wants it: row by row, for row vectors.
+    pub fn world_to_camera(&self) -> [f32; 16] {
+        std::array::from_fn(|i| self.camera_from_world.m[i % 4][i / 4] as f32)
+    }
+
+    /// Limits and biases that the scene itself asks for, for the header.
+    pub fn limits(&self) -> Vec<String> {
+        self.limits.clone()
+    }
+
+    /// Counts, for `check`.
+    pub fn facts(&self) -> &Facts {
+        &self.facts
+    }
+
+    /// Name of a material, or its kind.
+    pub fn material_name(&self, id: MaterialId) -> &str {
+        self.facts.material_names.get(id.0 as usize).map_or("?", String::as_str)
+    }
+}

@@ -1,0 +1,84 @@
+//! The open set: what walks a scene, one call per work unit.
+
+use irradiant_core::film::{FilmTile, PixelBounds};
+use irradiant_core::scene::Scene;
+use std::ops::{AddAssign, Range};
+
+/// Some samples of some pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorkUnit {
+    /// Which pixels.
+    pub bounds: PixelBounds,
+    /// Which samples of each.
+    pub samples: Range<u32>,
+}
+
+/// What an integrator did, for reports. Merging is addition.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderStats {
+    /// Samples taken, refused ones included.
+    pub paths: u64,
+    /// Rays from the camera.
+    pub camera_rays: u64,
+    /// Rays from surfaces that look for the closest hit.
+    pub bounce_rays: u64,
+    /// Rays that ask whether something is in the way.
+    pub shadow_rays: u64,
+    /// Scattering events on all paths together.
+    pub scatterings: u64,
+    /// Most scattering events on one path.
+    pub longest_path: u32,
+    /// The first few refused samples: pixel x, y, sample index.
+    pub refused: Vec<(i32, i32, u32)>,
+}
+
+impl RenderStats {
+    /// At most this many refused samples are located.
+    pub const MAX_REFUSED: usize = 16;
+}
+
+impl AddAssign<&RenderStats> for RenderStats {
+    fn add_assign(&mut self, other: &RenderStats) {
+        self.paths += other.paths;
+        self.camera_rays += other.camera_rays;
+        self.bounce_rays += other.bounce_rays;
+        self.shadow_rays += other.shadow_rays;
+        self.scatterings += other.scatterings;
+        self.longest_path = self.longest_path.max(other.longest_path);
+        self.refused.extend_from_slice(&other.refused);
+        // Sorted before cutting, so that the list does not depend on which thread came first more than it must.
+        self.refused.sort_unstable();
+        self.refused.truncate(Self::MAX_REFUSED);
+    }
+}
+
+/// An estimator of the picture. Strangers may write one; ours are in [`crate::path`] and its neighbours.
+pub trait Integrator: Send + Sync {
+    /// Takes the unit's samples and adds them to `tile` (whose bounds are the unit's). A sample is a pure function of
+    /// (scene, settings, pixel, sample index), whatever the unit that it comes in.
+    fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats);
+
+    /// What makes the expected picture differ from the solution of the rendering equation; empty when unbiased.
+    fn limits(&self) -> Vec<Limit>;
+}
+
+/// Something that a picture leaves out or changes, for the label in its header.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Light after more scattering events than this is left out.
+    MaxDepth(u32),
+    /// The estimator computes something else than the rendering equation's solution.
+    OtherQuantity(&'static str),
+    /// Named bias.
+    Bias(String),
+}
+
+impl std::fmt::Display for Limit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::MaxDepth(n) => write!(f, "maxdepth {n}"),
+            Self::OtherQuantity(what) => write!(f, "{what}"),
+            Self::Bias(what) => write!(f, "{what}"),
+        }
+    }
+}

@@ -1,0 +1,331 @@
+//! Path tracing with multiple importance sampling: the production estimator.
+//!
+//! L = sum over i of K^i(Le), one path at a time: at each vertex one light sample and one BSDF sample, combined by the
+//! power heuristic (Veach and Guibas 1995), ended by Russian roulette on the throughput. Wavelengths: the four of a path
+//! share one set of decisions whose densities do not depend on wavelength, so that no wavelength weighting is needed;
+//! a dispersive vertex ends the secondary ones.
+
+use crate::camera_samples::for_each_sample;
+use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
+use irradiant_core::bsdf::Bsdf;
+use irradiant_core::bxdf::TransportMode;
+use irradiant_core::camera::CameraRay;
+use irradiant_core::film::FilmTile;
+use irradiant_core::interaction::{Interaction, ReferencePoint};
+use irradiant_core::light::SampleMode;
+use irradiant_core::sampler::SampleStream;
+use irradiant_core::scene::Scene;
+use irradiant_math::Ray;
+use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+
+/// What can be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PathIntegrator {
+    /// Scattering events at most; `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Blur sharp lobes after the first non-specular bounce. Biased.
+    pub regularize: bool,
+}
+
+impl Integrator for PathIntegrator {
+    fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
+        for_each_sample(scene, unit, tile, stats, |sample, camera_ray, lambda, layers, stats| {
+            self.radiance(scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
+        });
+    }
+
+    fn limits(&self) -> Vec<Limit> {
+        let depth = self.max_depth.map(Limit::MaxDepth);
+        let regularize = self.regularize.then(|| Limit::Bias("regularize (biased)".into()));
+        depth.into_iter().chain(regularize).collect()
+    }
+}
+
+/// Where the last scattering event was, for weighing a light that the next ray meets.
+struct Previous {
+    reference: ReferencePoint,
+    bsdf_pdf: f32,
+    specular: bool,
+}
+
+impl PathIntegrator {
+    /// What the camera ray sees, by one random path. Fills the layers of the film at the first surface.
+    pub fn radiance<R: PathRecorder>(
+        &self,
+        scene: &Scene,
+        camera_ray: &CameraRay,
+        stream: &SampleStream,
+        lambda: &mut Wavelengths,
+        layers: &mut [f32],
+        stats: &mut RenderStats,
+        recorder: &mut R,
+    ) -> SampledSpectrum {
+        let mut ray = camera_ray.ray;
+        let mut radiance = SampledSpectrum::ZERO;
+        let mut throughput = SampledSpectrum::ONE;
+        let mut depth = 0;
+        // Radiance is scaled by eta^2 at each refraction; roulette must not mistake that for brightness.
+        let mut eta_scale = 1.0;
+        let mut previous: Option<Previous> = None;
+        let mut any_non_specular = false;
+        recorder.begin(lambda);
+
+        let why = loop {
+            let Some(hit) = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha()) else {
+                radiance += self.escaped(scene, &ray, &throughput, lambda, previous.as_ref(), depth, recorder);
+                break PathEnd::Escaped;
+            };
+            let at = scene.geometry.interaction(&ray, &hit);
+
+            // Light that the ray meets by itself.
+            if at.light.is_some() {
+                radiance += self.emitted(scene, &ray, &at, &throughput, lambda, previous.as_ref(), depth, recorder);
+            }
+
+            let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
+            let mix = stream.mix(depth);
+            let Some(mut bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix)
+            else {
+                // An interface: no surface, only a boundary. Weighing lights across it would need its light sampling too.
+                ray = at.spawn_ray(ray.d);
+                if let Some(p) = &mut previous {
+                    p.specular = true;
+                }
+                stats.bounce_rays += 1;
+                continue;
+            };
+            recorder.vertex(depth, &at);
+            if depth == 0 && !layers.is_empty() {
+                scene.layers.fill(layers, scene, camera_ray, &at, &footprint, &bsdf, lambda);
+            }
+            if self.max_depth.is_some_and(|limit| depth >= limit) {
+                break PathEnd::MaxDepth;
+            }
+            if self.regularize && any_non_specular {
+                bsdf.regularize();
+            }
+
+            // Direct light: one sample of one light.
+            if bsdf.flags().is_non_specular() {
+                radiance += direct_light(scene, &at, &bsdf, &throughput, lambda, stream, depth, stats, recorder);
+            }
+
+            // The next direction.
+            let draws = stream.scatter(depth);
+            let wo = at.wo;
+            let Some(sample) = bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance) else {
+                break PathEnd::Absorbed;
+            };
+            depth += 1;
+            stats.scatterings += 1;
+            stats.longest_path = stats.longest_path.max(depth);
+            throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
+            if throughput.is_black() {
+                break PathEnd::Absorbed;
+            }
+            let specular = sample.lobe.is_specular();
+            let bsdf_pdf = if sample.pdf_is_proportional && !specular {
+                bsdf.pdf(wo, sample.wi, TransportMode::Radiance)
+            } else {
+                sample.pdf
+            };
+            any_non_specular |= !specular;
+            if sample.lobe.is_transmissive() {
+                eta_scale *= sample.eta * sample.eta;
+            }
+
+            // Russian roulette: end paths that carry little.
+            let survival = survival_probability(&throughput, eta_scale, depth);
+            recorder.scattering(&Scattering {
+                depth: depth - 1,
+                wi: sample.wi,
+                lobe: sample.lobe,
+                pdf: sample.pdf,
+                throughput,
+                survival,
+            });
+            if survival < 1.0 {
+                if draws.roulette >= survival {
+                    break PathEnd::Roulette;
+                }
+                throughput *= 1.0 / survival;
+            }
+            previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular });
+            ray = at.spawn_ray(sample.wi);
+            stats.bounce_rays += 1;
+        };
+        recorder.end(why);
+        radiance
+    }
+
+    /// Light from environments that an escaping ray sees, weighed against having sampled them.
+    fn escaped<R: PathRecorder>(
+        &self,
+        scene: &Scene,
+        ray: &Ray,
+        throughput: &SampledSpectrum,
+        lambda: &Wavelengths,
+        previous: Option<&Previous>,
+        depth: u32,
+        recorder: &mut R,
+    ) -> SampledSpectrum {
+        recorder.escape(depth, ray.d);
+        let mut sum = SampledSpectrum::ZERO;
+        for &light in scene.lights.infinite() {
+            let emitted = scene.lights[light].escaped(ray.d, lambda);
+            if emitted.is_black() {
+                continue;
+            }
+            let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
+                scene.light_sampler.pmf(&p.reference, light)
+                    * scene.lights[light].pdf_escaped(&p.reference, ray.d, SampleMode::Incomplete)
+            });
+            let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
+            let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
+            let radiance = *throughput * emitted * weight;
+            sum += radiance;
+            recorder.contribution(&Contribution {
+                bounces: depth,
+                technique: Technique::Hit,
+                light,
+                radiance,
+                mis_weight: weight,
+                light_pdf,
+                bsdf_pdf,
+            });
+        }
+        sum
+    }
+
+    /// Light that the surface emits towards where the ray came from, weighed against having sampled it.
+    fn emitted<R: PathRecorder>(
+        &self,
+        scene: &Scene,
+        ray: &Ray,
+        at: &Interaction,
+        throughput: &SampledSpectrum,
+        lambda: &Wavelengths,
+        previous: Option<&Previous>,
+        depth: u32,
+        recorder: &mut R,
+    ) -> SampledSpectrum {
+        let Some(light) = at.light else { return SampledSpectrum::ZERO };
+        let emitted = scene.lights[light].emitted(at, at.wo, lambda);
+        if emitted.is_black() {
+            return SampledSpectrum::ZERO;
+        }
+        let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
+            scene.light_sampler.pmf(&p.reference, light) * scene.lights[light].pdf_hit(&p.reference, ray.d, at)
+        });
+        let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
+        let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
+        let radiance = *throughput * emitted * weight;
+        recorder.contribution(&Contribution {
+            bounces: depth,
+            technique: Technique::Hit,
+            light,
+            radiance,
+            mis_weight: weight,
+            light_pdf,
+            bsdf_pdf,
+        });
+        radiance
+    }
+}
+
+/// Light that arrives straight from one sampled point of one sampled light and is scattered along the path.
+fn direct_light<R: PathRecorder>(
+    scene: &Scene,
+    at: &Interaction,
+    bsdf: &Bsdf,
+    throughput: &SampledSpectrum,
+    lambda: &Wavelengths,
+    stream: &SampleStream,
+    depth: u32,
+    stats: &mut RenderStats,
+    recorder: &mut R,
+) -> SampledSpectrum {
+    let draws = stream.light(depth);
+    let reference = at.reference();
+    let Some((light, pmf)) = scene.light_sampler.sample(&reference, draws.pick) else {
+        return SampledSpectrum::ZERO;
+    };
+    let Some(sample) = scene.lights[light].sample(&reference, draws.uv, lambda, SampleMode::Incomplete) else {
+        return SampledSpectrum::ZERO;
+    };
+    let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);
+    let f = f * sample.wi.dot(bsdf.frame.z).abs();
+    if f.is_black() || sample.radiance.is_black() {
+        return SampledSpectrum::ZERO;
+    }
+    stats.shadow_rays += 1;
+    if scene.is_occluded(at, &sample) {
+        return SampledSpectrum::ZERO;
+    }
+    let light_pdf = pmf * sample.pdf;
+    // Weigh against the chance that the BSDF would have found this light; it never finds a delta.
+    let weight = if sample.is_delta { 1.0 } else { power_heuristic(light_pdf, bsdf_pdf) };
+    let radiance = *throughput * f * sample.radiance * (weight / light_pdf);
+    recorder.contribution(&Contribution {
+        bounces: depth + 1,
+        technique: Technique::LightSample,
+        light,
+        radiance,
+        mis_weight: weight,
+        light_pdf,
+        bsdf_pdf: if sample.is_delta { 0.0 } else { bsdf_pdf },
+    });
+    radiance
+}
+
+/// Veach's power heuristic (beta = 2) for one sample of each of two techniques: the weight of the one with density `a`.
+/// Densities whose squares overflow count as infinite.
+#[inline]
+pub fn power_heuristic(a: f32, b: f32) -> f32 {
+    let (a, b) = (a * a, b * b);
+    if a.is_infinite() {
+        1.0
+    } else if a > 0.0 {
+        a / (a + b)
+    } else {
+        0.0
+    }
+}
+
+/// After this many events even a path that loses nothing is ended now and then, so that closed scenes of albedo 1 end.
+const LONG_PATH: u32 = 128;
+
+/// Chance to go on: the largest throughput, freed of the eta^2 scaling; 1 for the first two events (as pbrt-v4).
+#[inline]
+fn survival_probability(throughput: &SampledSpectrum, eta_scale: f32, depth: u32) -> f32 {
+    if depth <= 1 {
+        return 1.0;
+    }
+    let carried = (*throughput * eta_scale).max_component();
+    let most = if depth < LONG_PATH { 1.0 } else { 0.95 };
+    carried.min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heuristic_weights_sum_to_one() {
+        for (a, b) in [(1.0, 1.0), (1e-10, 3.0), (1e15, 1e-15), (0.0, 2.0), (5.0, 0.0)] {
+            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6, "{a} {b}");
+        }
+        assert_eq!(power_heuristic(1e30, 1.0), 1.0);
+        assert_eq!(power_heuristic(0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn roulette_spares_the_first_bounces_and_glass() {
+        let dim = SampledSpectrum::splat(0.25);
+        assert_eq!(survival_probability(&dim, 1.0, 1), 1.0);
+        assert_eq!(survival_probability(&dim, 1.0, 2), 0.25);
+        assert_eq!(survival_probability(&dim, 2.25, 2), 0.5625);
+        assert_eq!(survival_probability(&SampledSpectrum::ONE, 1.0, LONG_PATH), 0.95);
+    }
+}

@@ -1,0 +1,107 @@
+//! From a file to a description.
+
+use crate::error::{Error, Report};
+use irradiant_formats::FileAssets;
+use irradiant_scene::desc::SceneDesc;
+use irradiant_scene::{AssetError, Assets};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+/// A scene as it was read, with all that was said about it.
+pub struct SceneFile {
+    /// As the user named it.
+    pub name: String,
+    /// What it says.
+    pub desc: SceneDesc,
+    /// Complaints so far (warnings only) and the texts.
+    pub report: Report,
+    /// The scene is the built-in one or otherwise asks for no depth limit.
+    pub(crate) unlimited_depth: bool,
+    pub(crate) assets: HashingAssets,
+    main_hash: blake3::Hash,
+}
+
+impl SceneFile {
+    /// A hash over every byte that was read so far for this scene: the text, what it includes, meshes and, once it is
+    /// compiled, images. 64 hexadecimal digits.
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(self.main_hash.as_bytes());
+        for (name, hash) in self.assets.hashes.lock().unwrap_or_else(|e| e.into_inner()).iter() {
+            hasher.update(&(name.len() as u64).to_le_bytes());
+            hasher.update(name.as_bytes());
+            hasher.update(hash.as_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}
+
+/// Reads a scene file; the format follows from the extension, pbrt-v4 text by default. `-` reads standard input.
+pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, Error> {
+    let path = path.as_ref();
+    let unreadable = |why| Error::Unreadable { path: path.to_owned(), why };
+    if path == Path::new("-") {
+        let mut text = Vec::new();
+        std::io::Read::read_to_end(&mut std::io::stdin().lock(), &mut text).map_err(unreadable)?;
+        return read("<stdin>", text.into(), FileAssets::new("."));
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let assets = FileAssets::new(folder);
+    let text = assets.read(path).map_err(|why| {
+        unreadable(match why {
+            AssetError::NotFound => std::io::Error::from(std::io::ErrorKind::NotFound),
+            other => std::io::Error::other(other.to_string()),
+        })
+    })?;
+    read(&path.display().to_string(), text, assets)
+}
+
+/// Reads a scene from text; files that it mentions are looked for in `folder`.
+pub fn load_text(name: &str, text: &str, folder: impl AsRef<Path>) -> Result<SceneFile, Error> {
+    read(name, text.as_bytes().into(), FileAssets::new(folder.as_ref()))
+}
+
+/// The built-in scene: the Cornell box from Cornell's measured geometry, reflectances and lamp, without depth limit.
+pub fn cornell_box() -> SceneFile {
+    let text = include_str!("../../../scenes/cornell-box.pbrt");
+    let mut scene = read("cornell-box.pbrt (built in)", text.as_bytes().into(), FileAssets::new("."))
+        .unwrap_or_else(|e| unreachable!("the built-in scene is valid: {e}"));
+    scene.unlimited_depth = true;
+    scene
+}
+
+fn read(name: &str, text: Arc<[u8]>, files: FileAssets) -> Result<SceneFile, Error> {
+    let assets = HashingAssets { files, hashes: Mutex::default() };
+    let main_hash = blake3::hash(&text);
+    let parsed = irradiant_formats::read(name, text, &assets);
+    let report = Report { diagnostics: parsed.diagnostics, sources: parsed.sources };
+    if report.diagnostics.has_errors() {
+        return Err(Error::Scene(Box::new(report)));
+    }
+    Ok(SceneFile { name: name.to_owned(), desc: parsed.desc, report, unlimited_depth: false, assets, main_hash })
+}
+
+/// Files, with a hash of each that was read: two renders whose hashes differ are of different scenes.
+pub(crate) struct HashingAssets {
+    files: FileAssets,
+    hashes: Mutex<BTreeMap<String, blake3::Hash>>,
+}
+
+impl Assets for HashingAssets {
+    fn read(&self, path: &Path) -> Result<Arc<[u8]>, AssetError> {
+        let bytes = self.files.read(path)?;
+        // Named relative to the scene, so that a moved folder is still the same scene.
+        let name = path.strip_prefix(self.files.root()).unwrap_or(path).to_string_lossy().replace('\\', "/");
+        self.hashes.lock().unwrap_or_else(|e| e.into_inner()).insert(name, blake3::hash(&bytes));
+        Ok(bytes)
+    }
+
+    fn resolve(&self, name: &str) -> PathBuf {
+        self.files.resolve(name)
+    }
+
+    fn exists(&self, path: &Path) -> bool {
+        self.files.exists(path)
+    }
+}

@@ -1,0 +1,217 @@
+//! From a description to a picture.
+
+use crate::error::{Error, Report};
+use crate::header::Header;
+use crate::load::SceneFile;
+use crate::settings::{ColorMode, MaxDepth, RenderSettings};
+use irradiant_core::film::{DevelopOptions, Film};
+use irradiant_core::scene::{CompileOptions, Scene};
+use irradiant_image::{FileFormat, Image, ToneOptions, atomic_write};
+use irradiant_render::ambient_occlusion::AmbientOcclusionIntegrator;
+use irradiant_render::path::PathIntegrator;
+use irradiant_render::random_walk::RandomWalkIntegrator;
+use irradiant_render::session::Finished;
+use irradiant_render::simple_path::SimplePathIntegrator;
+use irradiant_render::{Integrator, Limit, RenderStats, Session, SessionSettings};
+use irradiant_scene::desc::IntegratorKind;
+use irradiant_spectrum::Basis;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A compiled scene with everything decided: ready to start.
+pub struct Job {
+    /// The scene, ready to be walked.
+    pub scene: Arc<Scene>,
+    /// What will be written into the picture's header.
+    pub header: Header,
+    /// Complaints of reading and compiling (warnings only).
+    pub report: Report,
+    integrator: IntegratorKind,
+    max_depth: Option<u32>,
+    regularize: bool,
+    session: SessionSettings,
+}
+
+impl Job {
+    /// Compiles a scene under the settings. All errors at once.
+    pub fn new(file: &SceneFile, settings: &RenderSettings) -> Result<Self, Error> {
+        let integrator_desc = &file.desc.integrator;
+        let integrator = settings.integrator.unwrap_or(integrator_desc.kind);
+        let max_depth = match settings.max_depth {
+            Some(MaxDepth::None) => None,
+            Some(MaxDepth::Limit(n)) => Some(n),
+            None if file.unlimited_depth => None,
+            None => Some(integrator_desc.max_depth.value),
+        };
+        let options = CompileOptions {
+            basis: match settings.color {
+                ColorMode::Spectral => Basis::Spectral,
+                ColorMode::Rgb => Basis::Rgb,
+            },
+            resolution: settings.resolution,
+            crop: settings.crop,
+            samples_per_pixel: settings.samples_per_pixel,
+            seed: settings.seed,
+        };
+        let mut report = file.report.clone();
+        let compiled = Scene::compile(&file.desc, &file.assets, &options);
+        report.diagnostics.extend(compiled.diagnostics);
+        if settings.strict {
+            report.diagnostics.promote_not_honoured();
+        }
+        let scene = match compiled.scene {
+            Some(scene) if !report.diagnostics.has_errors() => Arc::new(scene),
+            _ => return Err(Error::Scene(Box::new(report))),
+        };
+        let samples_per_pixel = scene.samples_per_pixel;
+        let mut job = Self {
+            header: Header {
+                scene_hash: file.hash(),
+                integrator: integrator_name(&integrator),
+                sampler: scene.sampler.name().into(),
+                color: match settings.color {
+                    ColorMode::Spectral => "spectral".into(),
+                    ColorMode::Rgb => "rgb".into(),
+                },
+                seed: scene.seed,
+                samples_per_pixel,
+                samples_taken: None,
+                estimate: String::new(),
+                not_honoured: report.diagnostics.not_honoured().map(String::from).collect(),
+                samples_refused: 0,
+                world_to_camera: scene.world_to_camera(),
+            },
+            scene,
+            report,
+            integrator,
+            max_depth,
+            regularize: integrator_desc.regularize,
+            session: SessionSettings { threads: settings.threads, samples_per_pixel, time_limit: settings.time_limit },
+        };
+        job.header.estimate = estimate_label(job.integrator().as_ref(), &job.scene);
+        Ok(job)
+    }
+
+    /// The integrator, with its limits.
+    pub fn integrator(&self) -> Box<dyn Integrator> {
+        let max_depth = self.max_depth;
+        match self.integrator {
+            IntegratorKind::Path => Box::new(PathIntegrator { max_depth, regularize: self.regularize }),
+            IntegratorKind::SimplePath { sample_lights, sample_bsdf } => {
+                Box::new(SimplePathIntegrator { max_depth, sample_lights, sample_bsdf })
+            }
+            IntegratorKind::RandomWalk => Box::new(RandomWalkIntegrator { max_depth }),
+            IntegratorKind::AmbientOcclusion { cos_sample, max_distance } => {
+                Box::new(AmbientOcclusionIntegrator { cos_sample, max_distance })
+            }
+        }
+    }
+
+    /// The path integrator that replays samples, if this job uses it.
+    pub fn path_integrator(&self) -> Option<PathIntegrator> {
+        matches!(self.integrator, IntegratorKind::Path)
+            .then_some(PathIntegrator { max_depth: self.max_depth, regularize: self.regularize })
+    }
+
+    /// Starts rendering.
+    pub fn start(&self) -> Session {
+        Session::start(Arc::clone(&self.scene), self.integrator(), &self.session)
+    }
+
+    /// The picture of a film of this job (finished or not).
+    pub fn rendering(&self, film: Film, stats: RenderStats) -> Rendering {
+        let totals = film.totals();
+        let mut header = self.header.clone();
+        header.samples_refused = totals.not_finite + totals.out_of_range;
+        let refused = totals.not_finite + totals.out_of_range > 0;
+        let wanted = header.samples_per_pixel;
+        if !refused && (totals.min_count, totals.max_count) != (wanted, wanted) {
+            header.samples_taken = Some([totals.min_count, totals.max_count]);
+        }
+        Rendering { film, stats, header, variance: self.scene.layers.variance }
+    }
+}
+
+/// A picture: sums and counts, and what they are of.
+pub struct Rendering {
+    /// Sums and counts.
+    pub film: Film,
+    /// What was done.
+    pub stats: RenderStats,
+    /// What determines the pixels.
+    pub header: Header,
+    variance: bool,
+}
+
+impl Rendering {
+    /// The image of means, linear, with its header.
+    pub fn image(&self) -> Image {
+        let mut image = self.film.develop(DevelopOptions { standard_error: false, variance: self.variance });
+        let bounds = self.film.bounds();
+        let [width, height] = self.film.full_resolution();
+        image.metadata.origin = [bounds.x0, bounds.y0];
+        image.metadata.display_window = Some([0, 0, width as i32, height as i32]);
+        self.header.write_to(&mut image.metadata);
+        image
+    }
+
+    /// Writes a file, all of it or none; the format follows from the extension (exr, png, pfm, hdr, qoi, jpg).
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        self.save_exposed(path, 0.0)
+    }
+
+    /// As [`Rendering::save`], with an exposure in stops for formats that are for display (png, qoi, jpg).
+    pub fn save_exposed(&self, path: impl AsRef<Path>, exposure: f32) -> Result<(), Error> {
+        let path = path.as_ref();
+        let format = FileFormat::from_name(&path.to_string_lossy()).ok_or_else(|| {
+            Error::Settings(format!(
+                "{}: unknown kind of picture; known are .exr .png .pfm .hdr .qoi .jpg",
+                path.display()
+            ))
+        })?;
+        let output = |why| Error::Output { path: path.to_owned(), why };
+        let image = self.image();
+        let image = match format {
+            FileFormat::Exr => image,
+            FileFormat::Pfm | FileFormat::Hdr => image.to_rgb().unwrap_or(image),
+            _ => irradiant_image::to_srgb8(&image, &ToneOptions { exposure, ..ToneOptions::default() }),
+        };
+        let bytes = irradiant_image::write(&image, format).map_err(output)?;
+        atomic_write(path, &bytes).map_err(output)
+    }
+}
+
+/// Loads nothing, decides everything, renders, waits.
+pub fn render(file: &SceneFile, settings: &RenderSettings) -> Result<Rendering, Error> {
+    let job = Job::new(file, settings)?;
+    let Finished { film, stats, worker_panicked } = job.start().wait();
+    if worker_panicked {
+        return Err(Error::Internal("a render thread stopped; please report the scene".into()));
+    }
+    Ok(job.rendering(film, stats))
+}
+
+fn integrator_name(kind: &IntegratorKind) -> String {
+    match kind {
+        IntegratorKind::Path => "path".into(),
+        IntegratorKind::SimplePath { sample_lights, sample_bsdf } => {
+            format!("simplepath samplelights={sample_lights} samplebsdf={sample_bsdf}")
+        }
+        IntegratorKind::RandomWalk => "randomwalk".into(),
+        IntegratorKind::AmbientOcclusion { cos_sample, max_distance } => {
+            format!("ambientocclusion cossample={cos_sample} maxdistance={max_distance}")
+        }
+    }
+}
+
+/// "unbiased", or why not.
+fn estimate_label(integrator: &dyn Integrator, scene: &Scene) -> String {
+    let mut limits = integrator.limits();
+    limits.extend(scene.limits().into_iter().map(Limit::Bias));
+    if limits.is_empty() {
+        return "unbiased".into();
+    }
+    let list = limits.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let biased = limits.iter().any(|l| matches!(l, Limit::Bias(what) if what.contains("biased")));
+    format!("{}: {list}", if biased { "biased" } else { "truncated" })
+}

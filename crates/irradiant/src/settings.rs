@@ -1,0 +1,52 @@
+//! What a user may set over what the scene says.
+
+use irradiant_scene::desc::IntegratorKind;
+use std::time::Duration;
+
+/// The basis of colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColorMode {
+    /// Four wavelengths a path.
+    #[default]
+    Spectral,
+    /// Three numbers in the film's colour space: the same code in another basis. Dispersion and measured spectra are
+    /// reduced to three numbers.
+    Rgb,
+}
+
+/// A depth limit to use instead of the scene's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaxDepth {
+    /// No limit: unbiased.
+    None,
+    /// At most this many scattering events.
+    Limit(u32),
+}
+
+/// An integrator to use instead of the scene's.
+pub type IntegratorChoice = IntegratorKind;
+
+/// Settings of a render; `None` and the default mean what the scene says.
+#[derive(Clone, Debug, Default)]
+pub struct RenderSettings {
+    /// Samples per pixel.
+    pub samples_per_pixel: Option<u32>,
+    /// Stop after this time.
+    pub time_limit: Option<Duration>,
+    /// Seed of the random numbers.
+    pub seed: Option<u64>,
+    /// Worker threads; 0: one per core.
+    pub threads: usize,
+    /// Width and height, pixels.
+    pub resolution: Option<[u32; 2]>,
+    /// The part to render: x0, x1, y0, y1 as fractions of the image.
+    pub crop: Option<[f32; 4]>,
+    /// Integrator.
+    pub integrator: Option<IntegratorChoice>,
+    /// Depth limit.
+    pub max_depth: Option<MaxDepth>,
+    /// Basis of colour.
+    pub color: ColorMode,
+    /// Scene content that is not honoured is an error.
+    pub strict: bool,
+}
