@@ -151,8 +151,6 @@ fn a_million_rays_meet_what_brute_force_meets() {
             _ => false,
         };
         wrong += !same as u32;
-            eprintln!("{:?} {:?} {:?}", ours.map(|h| (h.t, g.interaction(&ray, &h).shape)), best, ray.d.length());
-        }
         // Any-hit must agree with closest-hit on either side of it.
         if let Some(h) = ours {
             assert!(g.occluded(&ray, f32::INFINITY, &NoAlphaTextures));
