@@ -60,7 +60,19 @@ impl Random {
 
     fn mutate(&mut self, text: &[u8]) -> Vec<u8> {
         const WORDS: [&str; 14] = [
-            "\"", "[", "]", "-1", "99999999999", "1e400", "nan", "AttributeEnd", "ObjectEnd", "\\", "WorldBegin", "\n", "0",
+            "\"",
+            "[",
+            "]",
+            "-1",
+            "99999999999",
+            "1e400",
+            "nan",
+            "AttributeEnd",
+            "ObjectEnd",
+            "\\",
+            "WorldBegin",
+            "\n",
+            "0",
             "\"string filename\"",
         ];
         let mut out = text.to_vec();

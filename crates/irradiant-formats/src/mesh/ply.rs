@@ -674,7 +674,8 @@ pub(crate) mod tests {
         assert!(read(huge.as_bytes()).unwrap_err().to_string().contains("too short"));
         let huge = TRIANGLE.replace("ascii", "binary_little_endian").replace("vertex 3", "vertex 18446744073709551615");
         assert!(read(huge.as_bytes()).is_err());
-        let mut long = TRIANGLE.replace("element face", "element extra 18446744073709551615\nelement face").into_bytes();
+        let mut long =
+            TRIANGLE.replace("element face", "element extra 18446744073709551615\nelement face").into_bytes();
         long.extend_from_slice(b"1 1 1");
         assert!(read(&long).is_ok(), "an element without properties takes no bytes");
     }

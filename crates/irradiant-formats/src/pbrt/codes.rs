@@ -31,17 +31,17 @@ pub const CODES: &[Code] = &[
     code("E0003", "A string in quotes has to stand here.", "Shape sphere"),
     code("E0004", "A number has to stand here.", "Translate 1 2 up"),
     code("E0005", "The file ends in the middle of a statement.", "Translate 1 2"),
-    code("E0006", "No such directive. Directives are unquoted words that begin with a capital letter.", "Shpae \"sphere\""),
+    code(
+        "E0006",
+        "No such directive. Directives are unquoted words that begin with a capital letter.",
+        "Shpae \"sphere\"",
+    ),
     code(
         "E0007",
         "A parameter has no value, or a list of values is not closed with ].",
         "Shape \"sphere\" \"float radius\" [ 1",
     ),
-    code(
-        "E0008",
-        "A parameter is declared by its type and its name in one string.",
-        "Shape \"sphere\" \"radius\" 1",
-    ),
+    code("E0008", "A parameter is declared by its type and its name in one string.", "Shape \"sphere\" \"radius\" 1"),
     code(
         "E0009",
         "No such parameter type. Types: bool, float, integer, point2, vector2, point3, vector3, normal, rgb, spectrum, \
@@ -84,7 +84,11 @@ pub const CODES: &[Code] = &[
          LookAt along its own \"up\".",
         "Scale 1 0 1",
     ),
-    code("E0109", "A file includes itself, or a scene is nested too deeply or too large.", "Include \"this-file.pbrt\""),
+    code(
+        "E0109",
+        "A file includes itself, or a scene is nested too deeply or too large.",
+        "Include \"this-file.pbrt\"",
+    ),
     code("E0110", "No such option, or a value that it cannot have.", "Option \"disablepixeljitter\" 1"),
     code("E0111", "Colour spaces: srgb, dci-p3, rec2020, aces2065-1.", "ColorSpace \"sRGB2\""),
     code(
@@ -127,11 +131,7 @@ pub const CODES: &[Code] = &[
          error.",
         "WorldBegin Shape \"sphere\" \"float raduis\" 1",
     ),
-    code(
-        "E0302",
-        "The parameter exists, with another type.",
-        "WorldBegin Shape \"sphere\" \"integer radius\" 1",
-    ),
+    code("E0302", "The parameter exists, with another type.", "WorldBegin Shape \"sphere\" \"integer radius\" 1"),
     code("E0303", "A parameter has too few or too many values.", "WorldBegin Shape \"sphere\" \"float radius\" [1 2]"),
     code("E0304", "Something cannot be made without this parameter.", "WorldBegin Shape \"plymesh\""),
     code(
@@ -229,9 +229,21 @@ pub const CODES: &[Code] = &[
     ),
     code("N0116", "An old name of \"interface\".", "WorldBegin Material \"none\""),
     code("N0503", "Polygons of a mesh file were cut into triangles, as fans.", "(a PLY file with pentagons)"),
-    code("N0504", "Points and lines among the faces of a mesh file were left out.", "(a PLY file with faces of two corners)"),
-    code("N0505", "Normals or uvs of a mesh file were NaN or infinite, and were set to 0.", "(a PLY file with nan nan nan)"),
-    code("N0601", "The file is written for pbrt-v3: pbrt --upgrade converts most of it.", "WorldBegin Material \"matte\""),
+    code(
+        "N0504",
+        "Points and lines among the faces of a mesh file were left out.",
+        "(a PLY file with faces of two corners)",
+    ),
+    code(
+        "N0505",
+        "Normals or uvs of a mesh file were NaN or infinite, and were set to 0.",
+        "(a PLY file with nan nan nan)",
+    ),
+    code(
+        "N0601",
+        "The file is written for pbrt-v3: pbrt --upgrade converts most of it.",
+        "WorldBegin Material \"matte\"",
+    ),
     code(
         "W0101",
         "Participating media are not rendered yet: light passes through them as through vacuum.",
@@ -281,7 +293,11 @@ pub const CODES: &[Code] = &[
         "A parameter is given twice; the last one counts.",
         "WorldBegin Shape \"sphere\" \"float radius\" 1 \"float radius\" 2",
     ),
-    code("W0113", "TransformBegin and TransformEnd are deprecated names of AttributeBegin and AttributeEnd.", "WorldBegin TransformBegin TransformEnd"),
+    code(
+        "W0113",
+        "TransformBegin and TransformEnd are deprecated names of AttributeBegin and AttributeEnd.",
+        "WorldBegin TransformBegin TransformEnd",
+    ),
     code(
         "W0115",
         "Both forms of cropping are given; \"cropwindow\" counts.",
