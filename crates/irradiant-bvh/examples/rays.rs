@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release -p irradiant-bvh --example rays [passes] [width]` prints build time, memory and Mray/s of one
 //! thread (time on the processor where Linux tells it, else wall time). Primary rays come in tiles of 4 x 4 pixels;
-//! bounces are cosine-distributed about the normal; shadow rays go to a square under the ceiling.
+//! bounces are cosine-distributed about the normal; shadow rays go to a square under the ceiling
+//! where they face it.
 
 use std::time::Instant;
 
@@ -117,11 +118,12 @@ fn bounce(landings: &[(V, V)], salt: u64) -> Vec<Ray> {
 }
 
 fn shadow(landings: &[(V, V)]) -> Vec<Ray> {
-    let one = |(i, &(o, _)): (usize, &(V, V))| {
+    let one = |(i, &(o, n)): (usize, &(V, V))| {
         let light = [-2.0 + 4.0 * random(i, 20), 9.9, -2.0 + 4.0 * random(i, 21)];
-        Ray { o, t_max: 0.999, d: sub(light, o), time: 0.0 }
+        let d = sub(light, o);
+        (dot(d, n) > 0.0).then_some(Ray { o, t_max: 0.999, d, time: 0.0 })
     };
-    landings.iter().enumerate().map(one).collect()
+    landings.iter().enumerate().filter_map(one).collect()
 }
 
 /// Seconds this thread has been on a processor, if the system says so.

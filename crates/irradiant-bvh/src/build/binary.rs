@@ -9,7 +9,9 @@ use crate::lanes::{Four, Native};
 /// Ranges of this many triangles or fewer are not split: they fit one block.
 const LEAF: usize = 4;
 /// Bins along an axis at most.
-const MAX_BINS: usize = 32;
+const MAX_BINS: usize = 64;
+/// Subtrees deeper than this are split in halves: it bounds the recursion for boxes whose sizes span hundreds of octaves.
+const MAX_SAH_DEPTH: usize = 64;
 /// Below this many primitives a subtree is built by one thread.
 const PARALLEL: usize = 1 << 14;
 
@@ -83,8 +85,8 @@ fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>) 
         return;
     }
     let middle = match split {
-        Split::Sah => best_split(refs, &boxes, &centres),
-        Split::Halve => None,
+        Split::Sah if depth < MAX_SAH_DEPTH => best_split(refs, &boxes, &centres),
+        Split::Sah | Split::Halve => None,
     };
     let middle = middle.unwrap_or_else(|| halve(refs, &centres, users));
     let (left, right) = refs.split_at_mut(middle);
@@ -145,8 +147,11 @@ impl Binning {
 }
 
 /// Partitions `refs` at the cheapest plane between bins; `None` if no plane separates anything.
+///
+/// Not inlined, so that its bins do not sit in every frame of the recursion.
+#[inline(never)]
 fn best_split(refs: &mut [Ref], boxes: &Bounds, centres: &Bounds) -> Option<usize> {
-    let n_bins = (4 + refs.len() / 8).min(MAX_BINS);
+    let n_bins = (8 + refs.len() / 2).min(MAX_BINS);
     let extent = (centres.hi - centres.lo).to_array();
     let size = (boxes.hi - boxes.lo).to_array();
     let largest = size[0].max(size[1]).max(size[2]);

@@ -90,11 +90,8 @@ impl Plan<'_> {
         let area = self.half_area(n);
         if node.right == 0 {
             let is_user = self.refs[first].is_user();
-            return Costs {
-                of: [area * self.leaf_cost(node.count, is_user); 7],
-                has_triangles: !is_user,
-                has_users: is_user,
-            };
+            let cost = self.leaf_cost(node.count, is_user);
+            return Costs { of: [area * cost; 7], has_triangles: !is_user, has_users: is_user };
         }
         let right = node.right as usize;
         let (mine, below) = choices.split_first_mut().expect("a subtree has its root");
@@ -179,6 +176,8 @@ impl Layout {
                 let k = usize::from(choices[n][0]);
                 open(plan, choices, n, first, k, WIDTH - k, &mut slots);
             }
+            // Any-hit traversal takes the last slot first; smallest first meets something soonest (see `walk::any`).
+            slots.sort_by(|a, b| plan.half_area(b.0).total_cmp(&plan.half_area(a.0)));
             let mut inner = Vec::with_capacity(WIDTH);
             for (i, &(child, first)) in slots.iter().enumerate() {
                 let count = plan.tree[child].count as usize;

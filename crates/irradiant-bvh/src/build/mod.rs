@@ -45,7 +45,7 @@ pub struct BuildSettings {
 
 impl Default for BuildSettings {
     fn default() -> Self {
-        Self { node_cost: 1.0, block_cost: 0.8, user_cost: 2.0, max_leaf_blocks: 4 }
+        Self { node_cost: 1.0, block_cost: 0.6, user_cost: 2.0, max_leaf_blocks: 4 }
     }
 }
 
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn trees_too_deep_for_the_stack_are_built_again_in_halves() {
-        // Boxes that halve in size towards a corner: each split of the heuristic takes off a few.
+        // Boxes that shrink towards a corner: each split of the heuristic takes off a few.
         let boxes: Vec<_> = (0..6000)
             .map(|i| {
                 let s = 0.97f32.powi(i);

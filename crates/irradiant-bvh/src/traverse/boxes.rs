@@ -32,6 +32,7 @@ fn reciprocal(ray: &Ray) -> ([f32; 3], [usize; 3]) {
 pub(crate) struct Halves<F> {
     origin: [F; 3],
     inverse: [F; 3],
+    padded: [F; 3],
     first: [usize; 3],
 }
 
@@ -41,7 +42,12 @@ impl<F: Four> BoxTest for Halves<F> {
     #[inline(always)]
     fn new(ray: &Ray) -> Self {
         let (inverse, first) = reciprocal(ray);
-        Self { origin: ray.o.map(F::splat), inverse: inverse.map(F::splat), first }
+        Self {
+            origin: ray.o.map(F::splat),
+            inverse: inverse.map(F::splat),
+            padded: inverse.map(|i| F::splat(i * PADDING)),
+            first,
+        }
     }
 
     #[inline(always)]
@@ -51,13 +57,13 @@ impl<F: Four> BoxTest for Halves<F> {
                 let (halves, _) = node.planes[p].as_chunks::<4>();
                 F::load(&halves[h])
             };
-            let (mut near, mut far) = (F::splat(0.0), F::splat(far));
+            let (mut near, mut far) = (F::splat(0.0), F::splat(far * PADDING));
             for axis in 0..3 {
                 let p = self.first[axis];
                 near = ((plane(p) - self.origin[axis]) * self.inverse[axis]).max(near);
-                far = ((plane(p ^ 1) - self.origin[axis]) * self.inverse[axis]).min(far);
+                far = ((plane(p ^ 1) - self.origin[axis]) * self.padded[axis]).min(far);
             }
-            (near.le(far * F::splat(PADDING)).mask(), near.to_array())
+            (near.le(far).mask(), near.to_array())
         };
         let ((low, [a, b, c, d]), (high, [e, f, g, h])) = (half(0), half(1));
         (low | high << 4, Near([a, b, c, d, e, f, g, h]))
@@ -80,6 +86,7 @@ pub(crate) mod x86 {
     pub(crate) struct Whole {
         origin: [__m256; 3],
         inverse: [__m256; 3],
+        padded: [__m256; 3],
         first: [usize; 3],
     }
 
@@ -88,7 +95,12 @@ pub(crate) mod x86 {
     fn prepare(ray: &Ray) -> Whole {
         let (inverse, first) = reciprocal(ray);
         let splat = |a: f32| _mm256_set1_ps(a);
-        Whole { origin: ray.o.map(splat), inverse: inverse.map(splat), first }
+        Whole {
+            origin: ray.o.map(splat),
+            inverse: inverse.map(splat),
+            padded: inverse.map(|i| splat(i * PADDING)),
+            first,
+        }
     }
 
     #[target_feature(enable = "avx2")]
@@ -97,15 +109,16 @@ pub(crate) mod x86 {
         #[allow(unsafe_code)]
         // SAFETY: each plane is eight floats, read unaligned. Guard: `all_levels_agree_with_brute_force`.
         let plane = |p: usize| unsafe { _mm256_loadu_ps(node.planes[p].as_ptr()) };
-        let distance = |p: usize, a: usize| _mm256_mul_ps(_mm256_sub_ps(plane(p), w.origin[a]), w.inverse[a]);
-        let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(far));
+        let distance =
+            |p: usize, a: usize, scale: &[__m256; 3]| _mm256_mul_ps(_mm256_sub_ps(plane(p), w.origin[a]), scale[a]);
+        let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(far * PADDING));
         for axis in 0..3 {
             let p = w.first[axis];
             // The second operand is what comes back if the first is NaN.
-            near = _mm256_max_ps(distance(p, axis), near);
-            far = _mm256_min_ps(distance(p ^ 1, axis), far);
+            near = _mm256_max_ps(distance(p, axis, &w.inverse), near);
+            far = _mm256_min_ps(distance(p ^ 1, axis, &w.padded), far);
         }
-        let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(near, _mm256_mul_ps(far, _mm256_set1_ps(PADDING)));
+        let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(near, far);
         let mut out = Near([0.0; WIDTH]);
         #[allow(unsafe_code)]
         // SAFETY: `Near` is eight floats, aligned to 32. Guard: as above.

@@ -1,8 +1,8 @@
 //! From a ray to what it meets, at any [`Level`].
 //!
 //! Children are visited by increasing (entry distance, reference), a total order, and box tests are the same unfused
-//! operations everywhere, so every level walks the same way through the tree. Boxes are entered if
-//! `near <= far * PADDING`, which covers the rounding of the slab test (Ize 2013) and that of the shear in the
+//! operations everywhere, so every level walks the same way through the tree. Distances at which a box is left are
+//! scaled up by `PADDING`, which covers the rounding of the slab test (Ize 2013) and that of the shear in the
 //! triangle test.
 
 mod boxes;

@@ -7,17 +7,17 @@ use crate::triangle::{self, Shear};
 
 /// Distance at which the ray enters child `i`, if it does before `far`.
 fn enter(node: &Node, i: usize, ray: &Ray, far: f32) -> Option<f32> {
-    let (mut near, mut far) = (0.0, far);
+    let (mut near, mut far) = (0.0, far * PADDING);
     for axis in 0..3 {
         let inverse = 1.0 / ray.d[axis];
         let side = usize::from(inverse.is_sign_negative());
         let enters = (node.planes[2 * axis + side][i] - ray.o[axis]) * inverse;
-        let leaves = (node.planes[2 * axis + 1 - side][i] - ray.o[axis]) * inverse;
+        let leaves = (node.planes[2 * axis + 1 - side][i] - ray.o[axis]) * (inverse * PADDING);
         // A ray inside a plane (0 times infinity, NaN) is bounded by neither side of that slab.
         near = if enters > near { enters } else { near };
         far = if leaves < far { leaves } else { far };
     }
-    (near <= far * PADDING).then_some(near)
+    (near <= far).then_some(near)
 }
 
 /// The children that the ray enters before `far`, farthest first.

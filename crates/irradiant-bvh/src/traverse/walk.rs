@@ -1,58 +1,60 @@
 //! The walk through the tree, generic over the box test; inlined whole into one entry point per level.
+//!
+//! What was tried, in Mray/s of one thread on a 2-core Xeon (Sapphire Rapids) shared with other work, where runs differ
+//! by 5 %; closest hits of primary / first bounce / second bounce rays, then shadow rays, in the room of
+//! `examples/rays.rs`:
+//! - Insertion sort of all entered children on the stack: 4.7 / 3.4 / 2.6. The network for up to four: 4.9 / 3.7 / 2.9.
+//! - No prefetch: 4.9 / 3.75 / 3.1. Two lines of each child that has to wait: 5.0 / 3.9 / 3.2 (4.1 and 3.4 in the best
+//!   run). Three lines of every child, the first included: 4.5 / 3.55 / 2.8.
+//! - Any hit, which child first: smallest box 7.3 (8.2 nodes and 4.0 blocks a ray); largest box 8.5 and 4.5; most
+//!   opacity per expected cost, estimated from areas, 8.4 and 4.5. For rays that start into their own surface
+//!   smallest first was 5.4 and largest first 3.1.
+//! - Scaling the exit by the padding once per ray instead of once per node: 2 % faster.
+//! - Binary leaves of one to three triangles before the collapse: no better, and the build 1.2 to 1.7 times longer.
+//!   Bins 64 instead of 32: 3 % fewer nodes visited. A leaf cost of 0.4 to 1.5 nodes per block: no difference beyond noise.
+//! - Huge pages under the tree (`GLIBC_TUNABLES=glibc.malloc.hugetlb=1`): 5 to 8 % faster, for whoever starts the program.
+//! - AVX-512 over AVX2 gains nothing with 256-bit vectors.
+//! - For comparison Embree 4.4 there: robust 3.8 / 3.15 / 2.6 / 5.2, fast (not watertight) 5.4 / 4.4 / 3.4 / 7.3.
 
 use std::mem::MaybeUninit;
 
 use super::boxes::BoxTest;
 use super::scalar::counts;
 use super::{Best, PADDING, is_proper};
-use crate::node::{Block, Bvh, Child, LAST_USER, STACK};
+use crate::node::{Block, Bvh, Child, LAST_USER, Node, STACK};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidate, Shear};
 
 /// A stack of children still to visit. The builder guarantees that [`STACK`] entries are enough.
 struct Stack<T> {
     entries: [MaybeUninit<T>; STACK],
-    n: usize,
 }
+
+/// [`STACK`] is a power of two: masking an index costs less than checking it, and never changes one that is in range.
+const MASK: usize = STACK - 1;
+const _: () = assert!(STACK.is_power_of_two());
 
 impl<T: Copy> Stack<T> {
     #[inline(always)]
     fn new() -> Self {
-        Self { entries: [const { MaybeUninit::uninit() }; STACK], n: 0 }
+        Self { entries: [const { MaybeUninit::uninit() }; STACK] }
     }
 
     #[inline(always)]
-    fn push(&mut self, entry: T) {
-        self.entries[self.n] = MaybeUninit::new(entry);
-        self.n += 1;
+    fn set(&mut self, i: usize, entry: T) {
+        debug_assert!(i < STACK);
+        self.entries[i & MASK] = MaybeUninit::new(entry);
     }
 
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    fn pop(&mut self) -> Option<T> {
-        self.n = self.n.checked_sub(1)?;
-        // SAFETY: entries below `n` were written by `push`, the only way to raise `n`; `sort_top` exchanges written
-        // ones. Guard: `all_levels_agree_with_brute_force` under any sanitizer, and every other test of traversal.
-        Some(unsafe { self.entries[self.n].assume_init() })
-    }
-}
-
-impl Stack<u64> {
-    /// Sorts the entries from `base` up, greatest first.
+    /// The entry at `i`, which was [`set`](Self::set).
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn sort_top(&mut self, base: usize) {
-        // SAFETY: as in `pop`; `base <= i < n`.
-        let key = |e: &MaybeUninit<u64>| unsafe { e.assume_init() };
-        for i in base + 1..self.n {
-            let entry = self.entries[i];
-            let mut j = i;
-            while j > base && key(&self.entries[j - 1]) < key(&entry) {
-                self.entries[j] = self.entries[j - 1];
-                j -= 1;
-            }
-            self.entries[j] = entry;
-        }
+    fn get(&self, i: usize) -> T {
+        // SAFETY: `closest` and `any` ask only below their count of entries, all of which they have set; no tree
+        // needs more than `STACK` (`Bvh::build`), so masking never aliases two of them, and every bit pattern of `T`
+        // (integers, `Child`) is a value. Guards: `all_levels_agree_with_brute_force`,
+        // `trees_too_deep_for_the_stack_are_built_again_in_halves`.
+        unsafe { self.entries[i & MASK].assume_init() }
     }
 }
 
@@ -71,6 +73,7 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
     let shear = Shear::new(ray);
     let mut best = Best::new(ray.t_max);
     let mut stack = Stack::new();
+    let mut n = 0;
     let mut child = Child(0);
     loop {
         // Down to a leaf.
@@ -78,39 +81,68 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
             let node = &bvh.nodes[child.index()];
             let (mut mask, near) = boxes.enter(node, best.t);
             if mask == 0 {
-                match next(&mut stack, best.t) {
+                match next(&stack, &mut n, best.t) {
                     Some(c) => child = c,
                     None => return best.finish(),
                 }
                 continue;
             }
-            let first = mask.trailing_zeros() as usize & 7;
-            mask &= mask - 1;
-            child = node.children[first];
-            if mask == 0 {
-                continue;
-            }
-            let a = key(near.0[first], child);
-            let second = mask.trailing_zeros() as usize & 7;
-            mask &= mask - 1;
-            let b = key(near.0[second], node.children[second]);
-            if mask == 0 {
-                child = Child(a.min(b) as u32);
-                stack.push(a.max(b));
-                continue;
-            }
-            let base = stack.n;
-            stack.push(a.max(b));
-            stack.push(a.min(b));
-            while mask != 0 {
+            let mut take = || {
                 let i = mask.trailing_zeros() as usize & 7;
                 mask &= mask - 1;
-                stack.push(key(near.0[i], node.children[i]));
+                (key(near.0[i], node.children[i]), mask == 0)
+            };
+            let (a, done) = take();
+            if done {
+                child = Child(a as u32);
+                continue;
             }
-            stack.sort_top(base);
-            if let Some(top) = stack.pop() {
-                child = Child(top as u32);
+
+            let (b, done) = take();
+            prefetch(bvh, Child(b as u32));
+            let (a, b) = (a.min(b), a.max(b));
+            if done {
+                child = Child(a as u32);
+                stack.set(n, b);
+                n += 1;
+                continue;
             }
+            let (c, done) = take();
+            prefetch(bvh, Child(c as u32));
+            let (a, c) = (a.min(c), a.max(c));
+            let (b, c) = (b.min(c), b.max(c));
+            if done {
+                child = Child(a as u32);
+                stack.set(n, c);
+                stack.set(n + 1, b);
+                n += 2;
+                continue;
+            }
+            let (d, mut done) = take();
+            prefetch(bvh, Child(d as u32));
+            let (b, d) = (b.min(d), b.max(d));
+            let (a, b) = (a.min(b), a.max(b));
+            let (c, d) = (c.min(d), c.max(d));
+            stack.set(n, d);
+            stack.set(n + 1, c);
+            stack.set(n + 2, b);
+            let base = n;
+            n += 3;
+            // Five or more: insert the rest.
+            let mut nearest = a;
+            while !done {
+                let (mut e, last) = take();
+                done = last;
+                (nearest, e) = (nearest.min(e), nearest.max(e));
+                let mut j = n;
+                while j > base && stack.get(j - 1) < e {
+                    stack.set(j, stack.get(j - 1));
+                    j -= 1;
+                }
+                stack.set(j, e);
+                n += 1;
+            }
+            child = Child(nearest as u32);
         }
         // Through the leaf.
         let mut index = child.index();
@@ -138,7 +170,7 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
                 index += 1;
             }
         }
-        match next(&mut stack, best.t) {
+        match next(&stack, &mut n, best.t) {
             Some(c) => child = c,
             None => return best.finish(),
         }
@@ -147,14 +179,39 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
 
 /// The nearest child still worth a visit.
 #[inline(always)]
-fn next(stack: &mut Stack<u64>, far: f32) -> Option<Child> {
+fn next(stack: &Stack<u64>, n: &mut usize, far: f32) -> Option<Child> {
     let far = far * PADDING;
-    loop {
-        let entry = stack.pop()?;
+    while *n > 0 {
+        *n -= 1;
+        let entry = stack.get(*n);
         if f32::from_bits((entry >> 32) as u32) <= far {
             return Some(Child(entry as u32));
         }
     }
+    None
+}
+
+/// Asks for the first two cache lines of what `child` refers to.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn prefetch(bvh: &Bvh, child: Child) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let (start, size) = if child.is_leaf() {
+            (bvh.blocks.as_ptr().cast::<i8>(), size_of::<Block>())
+        } else {
+            (bvh.nodes.as_ptr().cast::<i8>(), size_of::<Node>())
+        };
+        let line = start.wrapping_add(child.index() * size);
+        // SAFETY: a prefetch reads nothing that the program can see and faults at no address; SSE is baseline.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(line);
+            _mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (bvh, child);
 }
 
 #[inline(always)]
@@ -165,16 +222,25 @@ pub(super) fn any<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bo
     let boxes = B::new(ray);
     let shear = Shear::new(ray);
     let mut stack = Stack::new();
-    stack.push(Child(0));
-    while let Some(child) = stack.pop() {
+    let mut n = 0;
+    let mut child = Child(0);
+    loop {
         let mut index = child.index();
         if !child.is_leaf() {
             let node = &bvh.nodes[index];
             let (mut mask, _) = boxes.enter(node, ray.t_max);
-            while mask != 0 {
-                let i = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                stack.push(node.children[i]);
+            if mask != 0 {
+                // All but the last slot wait; the builder puts the child to be tried first there.
+                child = node.children[mask.ilog2() as usize & 7];
+                mask ^= 1 << mask.ilog2();
+                while mask != 0 {
+                    let waiting = node.children[mask.trailing_zeros() as usize & 7];
+                    prefetch(bvh, waiting);
+                    stack.set(n, waiting);
+                    mask &= mask - 1;
+                    n += 1;
+                }
+                continue;
             }
         } else if child.is_users() {
             loop {
@@ -205,6 +271,10 @@ pub(super) fn any<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bo
                 index += 1;
             }
         }
+        if n == 0 {
+            return false;
+        }
+        n -= 1;
+        child = stack.get(n);
     }
-    false
 }

@@ -45,9 +45,11 @@ pub fn fresnel_dielectric(cos_i: f32, eta: f32) -> f32 {
         return 1.0;
     }
     let cos_t = (1.0 - sin2_t).sqrt();
-    let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    let perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    0.5 * (parallel * parallel + perpendicular * perpendicular)
+    // (a/b)^2 + (c/d)^2 with one division.
+    let (a, b) = (eta * cos_i - cos_t, eta * cos_i + cos_t);
+    let (c, d) = (cos_i - eta * cos_t, cos_i + eta * cos_t);
+    let (ad, bc, bd) = (a * d, b * c, b * d);
+    0.5 * (ad * ad + bc * bc) / (bd * bd)
 }
 
 /// The fraction of light reflected by a conductor of index `eta + i k` relative to the outside, per lane, in [0, 1].

@@ -72,10 +72,11 @@ impl Ggx {
     /// The density of facet normals, per steradian, times the cosine integrating to 1.
     #[inline]
     pub fn d(&self, m: Vec3) -> f32 {
-        // x^2 + y^2 rather than 1 - z^2: keeps its digits for alphas of 1e-3.
-        let (x, y) = (m.x / self.alpha_x, m.y / self.alpha_y);
-        let q = x * x + y * y + m.z * m.z;
-        1.0 / (PI * self.alpha_x * self.alpha_y * q * q)
+        // x^2 + y^2 rather than 1 - z^2: keeps its digits for alphas of 1e-3. Scaled by the alphas to divide once.
+        let product = self.alpha_x * self.alpha_y;
+        let (x, y, z) = (m.x * self.alpha_y, m.y * self.alpha_x, m.z * product);
+        let q = x * x + y * y + z * z;
+        product * product * product / (PI * q * q)
     }
 
     /// The length of `w` stretched by the alphas, `sqrt(ax^2 x^2 + ay^2 y^2 + z^2)`; Smith's Lambda is `(s/|z| - 1)/2`.

@@ -14,7 +14,7 @@ pub enum Basis {
 /// Lower degrees are elevated exactly (Farin, Curves and Surfaces for CAGD, 5th edition, sections 6.1 and 8.3).
 pub fn segments(points: &[[f32; 3]], basis: Basis, degree: usize) -> Result<Vec<[[f32; 3]; 4]>, String> {
     let n = points.len();
-    let fits = n > degree && (basis == Basis::BSpline || (n - 1) % degree == 0);
+    let fits = n > degree && (basis == Basis::BSpline || (n - 1).is_multiple_of(degree));
     if !fits {
         let expected = match basis {
             Basis::Bezier => format!("{} or a multiple of {degree} more", degree + 1),

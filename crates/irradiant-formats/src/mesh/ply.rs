@@ -518,3 +518,192 @@ fn zero_not_finite<const N: usize>(list: &mut [[f32; N]]) -> usize {
     let bad = list.iter_mut().filter(|v| v.iter().any(|c| !c.is_finite()));
     bad.map(|v| *v = [0.0; N]).count()
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub const TRIANGLE: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
+    /// A mesh of two triangles, a quad and a pentagon, written in every way.
+    struct Writer {
+        encoding: &'static str,
+        vertex: [&'static str; 8],
+        names: [&'static str; 2],
+        list: [&'static str; 2],
+        extra: bool,
+    }
+
+    fn put(out: &mut Vec<u8>, encoding: &str, scalar: &str, v: f64) {
+        let bytes: Vec<u8> = match scalar {
+            _ if encoding == "ascii" => format!("{v} ").into_bytes(),
+            "char" => vec![v as i8 as u8],
+            "uchar" | "uint8" => vec![v as u8],
+            "short" => (v as i16).to_le_bytes().to_vec(),
+            "ushort" => (v as u16).to_le_bytes().to_vec(),
+            "int" | "int32" => (v as i32).to_le_bytes().to_vec(),
+            "uint" => (v as u32).to_le_bytes().to_vec(),
+            "float" | "float32" => (v as f32).to_le_bytes().to_vec(),
+            "double" => v.to_le_bytes().to_vec(),
+            _ => panic!("{scalar}"),
+        };
+        match encoding {
+            "binary_big_endian" => out.extend(bytes.iter().rev()),
+            _ => out.extend(bytes),
+        }
+    }
+
+    const FACES: [&[u32]; 4] = [&[0, 1, 2], &[0, 2, 3], &[0, 1, 2, 3], &[0, 1, 2, 3, 4]];
+
+    fn vertex(i: usize) -> [f64; 8] {
+        let i = i as f64;
+        [i, i * 0.5, -i, 0.0, 0.0, 1.0, i * 0.25, 1.0 - i * 0.125]
+    }
+
+    impl Writer {
+        fn write(&self) -> Vec<u8> {
+            let mut out = format!("ply\nformat {} 1.0\ncomment by hand\n", self.encoding);
+            if self.extra {
+                out += "element note 2\nproperty list uchar float words\n";
+            }
+            out += "element vertex 5\n";
+            if self.extra {
+                out += "property uchar red\nproperty list uchar short tags\n";
+            }
+            let names = ["x", "y", "z", "nx", "ny", "nz", self.names[0], self.names[1]];
+            for (scalar, name) in self.vertex.iter().zip(names) {
+                out += &format!("property {scalar} {name}\n");
+            }
+            out += &format!("element face 4\nproperty list {} {} vertex_indices\n", self.list[0], self.list[1]);
+            if self.extra {
+                out += "property int face_indices\nproperty float quality\n";
+            }
+            out += "end_header\n";
+            let mut out = out.into_bytes();
+            let e = self.encoding;
+            if self.extra {
+                for n in [0, 3] {
+                    put(&mut out, e, "uchar", n as f64);
+                    (0..n).for_each(|_| put(&mut out, e, "float", 1.5));
+                }
+            }
+            for i in 0..5 {
+                if self.extra {
+                    put(&mut out, e, "uchar", 255.0);
+                    put(&mut out, e, "uchar", 1.0);
+                    put(&mut out, e, "short", -3.0);
+                }
+                for (scalar, v) in self.vertex.iter().zip(vertex(i)) {
+                    put(&mut out, e, scalar, v);
+                }
+            }
+            for (i, f) in FACES.iter().enumerate() {
+                put(&mut out, e, self.list[0], f.len() as f64);
+                f.iter().for_each(|v| put(&mut out, e, self.list[1], f64::from(*v)));
+                if self.extra {
+                    put(&mut out, e, "int", 10.0 + i as f64);
+                    put(&mut out, e, "float", 0.5);
+                }
+            }
+            out
+        }
+    }
+
+    fn variants() -> Vec<Vec<u8>> {
+        let mut out = vec![];
+        for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            for (vertex, list) in [
+                (["float"; 8], ["uchar", "int"]),
+                (["float32"; 8], ["uint8", "uint"]),
+                (["double"; 8], ["int", "ushort"]),
+                (["float", "double", "float", "char", "short", "int32", "double", "float"], ["ushort", "uchar"]),
+            ] {
+                for names in [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]] {
+                    for extra in [false, true] {
+                        out.push(Writer { encoding, vertex, names, list, extra }.write());
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn all_encodings_types_and_names_give_the_same_mesh() {
+        let all = variants();
+        assert_eq!(all.len(), 96);
+        for (i, bytes) in all.iter().enumerate() {
+            let (mesh, remarks) = read(bytes).unwrap_or_else(|e| panic!("variant {i}: {e}"));
+            for v in 0..5 {
+                let expected = vertex(v).map(|c| c as f32);
+                assert_eq!(mesh.positions[v], expected[..3]);
+                assert_eq!(mesh.normals[v], expected[3..6]);
+                assert_eq!(mesh.uvs[v], expected[6..]);
+            }
+            assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+            assert_eq!(mesh.quads, [[0, 1, 3, 2]]);
+            assert_eq!(remarks.len(), 1);
+            assert_eq!(remarks[0].0, "N0503");
+            let ids: &[i32] = if i % 2 == 1 { &[10, 11, 13, 13, 13, 12] } else { &[] };
+            assert_eq!(mesh.face_indices, ids);
+        }
+    }
+
+    /// Every file that is cut short is refused, or was already whole; none panics.
+    #[test]
+    fn cut_files_are_refused() {
+        for bytes in variants() {
+            let whole = read(&bytes).unwrap().0;
+            for n in 0..bytes.len() {
+                if let Ok((mesh, _)) = read(&bytes[..n]) {
+                    // Only what follows the last digit, or is not looked at, may be missing.
+                    assert_eq!(mesh.positions.len(), whole.positions.len());
+                    assert!(bytes.len() - n < 12, "{n} of {}", bytes.len());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_header_is_not_believed() {
+        let huge = TRIANGLE.replace("vertex 3", "vertex 4000000000");
+        assert!(read(huge.as_bytes()).unwrap_err().to_string().contains("too short"));
+        let huge = TRIANGLE.replace("face 1", "face 99999999999");
+        assert!(read(huge.as_bytes()).unwrap_err().to_string().contains("too short"));
+        let huge = TRIANGLE.replace("ascii", "binary_little_endian").replace("vertex 3", "vertex 18446744073709551615");
+        assert!(read(huge.as_bytes()).is_err());
+        let mut long =
+            TRIANGLE.replace("element face", "element extra 18446744073709551615\nelement face").into_bytes();
+        long.extend_from_slice(b"1 1 1");
+        assert!(read(&long).is_ok(), "an element without properties takes no bytes");
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let bad = |from: &str, to: &str| read(TRIANGLE.replace(from, to).as_bytes()).unwrap_err().to_string();
+        assert!(bad("ply", "obj").contains("not a PLY"));
+        assert!(bad("3 0 1 2", "3 0 1 7").contains("names vertex 7"));
+        assert!(bad("3 0 1 2", "3 0 1 -1").contains("names vertex -1"));
+        assert!(bad("property float z", "property float w").contains("\"z\""));
+        assert!(bad("vertex_indices", "corners").contains("vertex_indices"));
+        assert!(bad("1 0 0", "nan 0 0").contains("vertex 1"));
+        assert!(bad("1 0 0", "x 0 0").contains("no number"));
+        assert!(bad("element face 1", "element face 0").contains("0 faces"));
+        assert!(bad("end_header", "").contains("line"));
+        assert!(bad("3 0 1 2", "2 0 1").contains("three corners"));
+        assert!(bad("list uchar int", "list uchar integer").contains("line 8"));
+    }
+
+    #[test]
+    fn unusable_normals_are_set_to_zero_and_said() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+            property float nx\nproperty float ny\nproperty float nz\nelement face 1\n\
+            property list uchar int vertex_index\nend_header\n\
+            0 0 0 nan nan nan\n1 0 0 0 0 1\n0 1 0 0 inf 1\n3 0 1 2\n";
+        let (mesh, remarks) = read(text.as_bytes()).unwrap();
+        assert_eq!(mesh.normals, [[0.0; 3], [0.0, 0.0, 1.0], [0.0; 3]]);
+        assert_eq!(remarks[0].0, "N0505");
+    }
+}

@@ -37,7 +37,7 @@ pub(crate) fn camera(r: &Reader, name: &Spanned<String>, p: &Params, camera_from
             screen_window: screen_window(),
         },
         "spherical" => {
-            (lens_radius(), focal_distance(), frame_aspect_ratio(), screen_window());
+            let _ = (lens_radius(), focal_distance(), frame_aspect_ratio(), screen_window());
             CameraKind::Spherical {
                 equirectangular: p.choice(r, "mapping", &[("equalarea", false), ("equirectangular", true)], false),
             }

@@ -24,7 +24,7 @@ use super::stand_ins;
 use super::state::PendingMaterial;
 use irradiant_scene::desc::material::{CoatDesc, ConductorDesc};
 use irradiant_scene::desc::{
-    MaterialDesc, MaterialKind, MaterialRef, RoughnessDesc, SpannedSpectrum, SpectrumDesc, SpectrumParam,
+    FloatParam, MaterialDesc, MaterialKind, MaterialRef, RoughnessDesc, SpannedSpectrum, SpectrumDesc, SpectrumParam,
 };
 use irradiant_scene::{Diagnostic, Spanned};
 use std::collections::BTreeMap;
@@ -94,11 +94,14 @@ impl Scope<'_, '_> {
 
     fn roughness(&self, names: [&'static str; 3], default: f32, remap: bool) -> RoughnessDesc {
         let [u, v, both] = names;
-        let one = |name| {
-            let own = self.p.float_param(self.r, self.t, name);
-            own.unwrap_or_else(|| self.p.float_param_or(self.r, self.t, both, default))
-        };
-        RoughnessDesc { u: one(u), v: one(v), remap }
+        let own = [u, v].map(|name| self.p.float_param(self.r, self.t, name));
+        let shared = self.p.float_param(self.r, self.t, both);
+        if let ([Some(_), Some(_)], Some(shared)) = (&own, &shared) {
+            let message = format!("\"{both}\" has no effect beside \"{u}\" and \"{v}\"");
+            self.r.error_help("E0305", message, shared.span, "leave it out");
+        }
+        let [u, v] = own.map(|own| own.or(shared).unwrap_or(Spanned::unplaced(FloatParam::Value(default))));
+        RoughnessDesc { u, v, remap }
     }
 
     fn remap(&self) -> bool {

@@ -578,7 +578,7 @@ fn unknown_texture(
 
 /// Pairs of wavelength and value with ascending wavelengths.
 fn samples(r: &Reader, name: &str, v: &[f32], span: Span) -> Option<Arc<[(f32, f32)]>> {
-    if v.is_empty() || v.len() % 2 != 0 {
+    if v.is_empty() || !v.len().is_multiple_of(2) {
         r.push(
             Diagnostic::error("E0307", format!("spectrum \"{name}\" has {} values", v.len()), span)
                 .label("expected pairs of wavelength (nm) and value")

@@ -61,7 +61,7 @@ pub(crate) fn shape(r: &Reader, name: &Spanned<String>, p: &Params) -> Option<Sh
 
 /// Vertex indices in groups of `N`, each below the number of vertices.
 fn indices<const N: usize>(r: &Reader, list: Spanned<&[i32]>, n_vertices: usize) -> Option<Vec<[u32; N]>> {
-    if list.value.len() % N != 0 {
+    if !list.value.len().is_multiple_of(N) {
         let message = format!("{} indices, which is not a multiple of {N}", list.value.len());
         r.error("E0505", message, list.span);
         return None;

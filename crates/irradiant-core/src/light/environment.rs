@@ -1,0 +1,185 @@
+//! Light from all around: scene word `infinite`, uniform or by an image.
+//!
+//! | parameter | unit | default | meaning |
+//! |---|---|---|---|
+//! | `L` | cd/m^2 with `scale` 1 | white | radiance from everywhere; its photometric size is taken out, but RGB keeps its own |
+//! | `filename` | | | square image of radiance under the equal-area octahedral map, +z at its centre |
+//! | `scale` | | 1 | factor |
+//! | `illuminance` | lx | | replaces the size: of a uniform one on any surface; of an image see `compile.rs` |
+//! | `portal` | world | | see [`super::portal`] |
+//!
+//! Pixels are constant patches (no interpolation), so the sampling density follows them exactly. When the caller also
+//! samples BSDFs and weighs both (MIS), the density is *compensated*: pixels below the mean are left to the BSDF
+//! (Karlik et al. 2019, "MIS compensation", as in pbrt-v4), and a uniform environment is left to it altogether.
+
+use super::emission::RadianceImage;
+use super::orientation::Orientation;
+use super::{Emission, EmittedRay, LightSample, LightTarget, SampleMode, SceneSphere};
+use irradiant_math::distribution::PiecewiseConstant2D;
+use irradiant_math::{Normal3, Point2, Vec3, warp};
+use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use std::f32::consts::PI;
+use std::sync::OnceLock;
+
+/// The same radiance from everywhere.
+#[derive(Clone, Debug)]
+pub struct UniformInfiniteLight {
+    /// Scale included.
+    pub radiance: Emission,
+    /// The scene.
+    pub scene: SceneSphere,
+}
+
+impl UniformInfiniteLight {
+    /// See [`super::Light::sample`].
+    #[inline]
+    pub fn sample(&self, u: Point2, lambda: &Wavelengths, mode: SampleMode) -> Option<LightSample> {
+        if mode == SampleMode::Compensated {
+            return None;
+        }
+        Some(LightSample {
+            radiance: self.radiance.sample(lambda),
+            wi: warp::uniform_sphere(u),
+            pdf: warp::uniform_sphere_pdf(),
+            target: LightTarget::Infinite,
+            is_delta: false,
+            alpha: None,
+        })
+    }
+
+    /// See [`super::Light::pdf_escaped`].
+    #[inline]
+    pub fn pdf(&self, mode: SampleMode) -> f32 {
+        match mode {
+            SampleMode::Complete => warp::uniform_sphere_pdf(),
+            SampleMode::Compensated => 0.0,
+        }
+    }
+
+    /// See [`super::Light::power`].
+    pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
+        self.radiance.sample(lambda) * (4.0 * PI * self.scene.disk_area())
+    }
+
+    /// See [`super::Light::emit`].
+    pub fn emit(&self, u_position: Point2, u_direction: Point2, lambda: &Wavelengths, time: f32) -> Option<EmittedRay> {
+        Some(EmittedRay {
+            radiance: self.radiance.sample(lambda),
+            ray: self.scene.ray_into(warp::uniform_sphere(u_direction), u_position, time),
+            normal: Normal3::ZERO,
+            pdf_position: 1.0 / self.scene.disk_area(),
+            pdf_direction: warp::uniform_sphere_pdf(),
+            alpha: None,
+        })
+    }
+}
+
+/// Radiance by direction from an image.
+#[derive(Debug)]
+pub struct ImageInfiniteLight {
+    image: RadianceImage,
+    orientation: Orientation,
+    scale: f32,
+    scene: SceneSphere,
+    mean_rgb: [f32; 3],
+    /// Each is made when first asked for; a render needs but one of them.
+    complete: OnceLock<PiecewiseConstant2D>,
+    compensated: OnceLock<PiecewiseConstant2D>,
+}
+
+impl ImageInfiniteLight {
+    /// From a square image; `None` when it is not square.
+    pub fn new(image: RadianceImage, orientation: Orientation, scale: f32, scene: SceneSphere) -> Option<Self> {
+        let mean_rgb = image.mean_rgb(|_| 1.0);
+        (image.width() == image.height()).then(|| Self {
+            image,
+            orientation,
+            scale,
+            scene,
+            mean_rgb,
+            complete: OnceLock::new(),
+            compensated: OnceLock::new(),
+        })
+    }
+
+    pub(super) fn scene(&self) -> &SceneSphere {
+        &self.scene
+    }
+
+    #[inline]
+    fn distribution(&self, mode: SampleMode) -> &PiecewiseConstant2D {
+        let cell = match mode {
+            SampleMode::Complete => &self.complete,
+            SampleMode::Compensated => &self.compensated,
+        };
+        cell.get_or_init(|| self.make_distribution(mode))
+    }
+
+    fn make_distribution(&self, mode: SampleMode) -> PiecewiseConstant2D {
+        let mut weights = self.image.sampling_weights(|_| 1.0);
+        if mode == SampleMode::Compensated {
+            let mean = (weights.iter().map(|&w| f64::from(w)).sum::<f64>() / weights.len() as f64) as f32;
+            weights.iter_mut().for_each(|w| *w = (*w - mean).max(0.0));
+            if weights.iter().all(|&w| w == 0.0) {
+                weights.fill(1.0);
+            }
+        }
+        let size = self.image.width();
+        PiecewiseConstant2D::new(weights, size, size).expect("a square image has a weight for each pixel, and a pixel")
+    }
+
+    #[inline]
+    fn radiance(&self, uv: Point2, lambda: &Wavelengths) -> SampledSpectrum {
+        self.image.radiance(self.image.nearest(uv), lambda) * self.scale
+    }
+
+    /// See [`super::Light::sample`].
+    #[inline]
+    pub fn sample(&self, u: Point2, lambda: &Wavelengths, mode: SampleMode) -> Option<LightSample> {
+        let s = self.distribution(mode).sample(u);
+        if !(s.pdf > 0.0) {
+            return None;
+        }
+        let w = warp::equal_area_square_to_sphere(s.p);
+        Some(LightSample {
+            radiance: self.radiance(s.p, lambda),
+            wi: self.orientation.to_render(w),
+            pdf: s.pdf / (4.0 * PI * self.orientation.stretch(w)),
+            target: LightTarget::Infinite,
+            is_delta: false,
+            alpha: None,
+        })
+    }
+
+    /// See [`super::Light::pdf_escaped`].
+    #[inline]
+    pub fn pdf(&self, wi: Vec3, mode: SampleMode) -> f32 {
+        let w = self.orientation.to_light(wi);
+        let uv = warp::equal_area_sphere_to_square(w);
+        self.distribution(mode).pdf(uv) / (4.0 * PI * self.orientation.stretch(w))
+    }
+
+    /// See [`super::Light::escaped`].
+    #[inline]
+    pub fn escaped(&self, direction: Vec3, lambda: &Wavelengths) -> SampledSpectrum {
+        self.radiance(warp::equal_area_sphere_to_square(self.orientation.to_light(direction)), lambda)
+    }
+
+    /// See [`super::Light::power`]; of the mean colour, which is the mean power but for the bend of uplifting.
+    pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
+        self.image.radiance(self.mean_rgb, lambda) * (self.scale * 4.0 * PI * self.scene.disk_area())
+    }
+
+    /// See [`super::Light::emit`].
+    pub fn emit(&self, u_position: Point2, u_direction: Point2, lambda: &Wavelengths, time: f32) -> Option<EmittedRay> {
+        let s = self.sample(u_direction, lambda, SampleMode::Complete)?;
+        Some(EmittedRay {
+            radiance: s.radiance,
+            ray: self.scene.ray_into(-s.wi, u_position, time),
+            normal: Normal3::ZERO,
+            pdf_position: 1.0 / self.scene.disk_area(),
+            pdf_direction: s.pdf,
+            alpha: None,
+        })
+    }
+}
