@@ -2,6 +2,7 @@
 //!
 //! # Layout
 //! In reading order: [`interaction`] (where a path met something), [`geometry`] (what rays meet),
+//! [`texture`] (values over surfaces), [`material`] (what a surface is made of),
 //! [`bxdf`] and [`bsdf`] (how light scatters there), [`light`] (where it comes from) and [`light_sampler`] (which light
 //! to ask), [`camera`] (where paths begin), [`sampler`] (random numbers), [`film`] (sums and counts).
 //! Nothing here reads files, clocks or the environment.
@@ -17,4 +18,6 @@ pub mod geometry;
 pub mod interaction;
 pub mod light;
 pub mod light_sampler;
+pub mod material;
 pub mod sampler;
+pub mod texture;
