@@ -2,8 +2,9 @@
 //!
 //! # Layout
 //! In reading order: [`interaction`] (where a path met something), [`geometry`] (what rays meet),
+//! [`texture`] (values over surfaces), [`material`] (what a surface is made of),
 //! [`bxdf`] and [`bsdf`] (how light scatters there), [`light`] (where it comes from) and [`light_sampler`] (which light
-//! to ask), [`sampler`] (random numbers), [`film`] (sums and counts).
+//! to ask), [`camera`] (where paths begin), [`sampler`] (random numbers), [`film`] (sums and counts).
 //! Nothing here reads files, clocks or the environment.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
@@ -11,9 +12,12 @@
 
 pub mod bsdf;
 pub mod bxdf;
+pub mod camera;
 pub mod film;
 pub mod geometry;
 pub mod interaction;
 pub mod light;
 pub mod light_sampler;
+pub mod material;
 pub mod sampler;
+pub mod texture;
