@@ -78,9 +78,8 @@ impl Mask {
         Self::from_shape(|x, y| {
             // Inside when a ray towards +x crosses the outline an odd number of times.
             let edges = corners.iter().zip(corners.iter().cycle().skip(1));
-            let crossings = edges.filter(|([x0, y0], [x1, y1])| {
-                (*y0 <= y) != (*y1 <= y) && x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
-            });
+            let crossings = edges
+                .filter(|([x0, y0], [x1, y1])| (*y0 <= y) != (*y1 <= y) && x < x0 + (y - y0) / (y1 - y0) * (x1 - x0));
             if crossings.count() % 2 == 1 { 1.0 } else { 0.0 }
         })
     }

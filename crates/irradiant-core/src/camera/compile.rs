@@ -116,14 +116,10 @@ impl Spaces {
     fn new(desc: &CameraDesc, render_space: RenderSpace, shutter_open: f32) -> Option<Self> {
         let motion = &desc.camera_from_world;
         let (t0, t1) = (motion.start_time as f32, motion.end_time as f32);
-        let (start, end) = (motion.start.inverse(), motion.end.inverse());
+        let (start, end) = (affine(motion.start.inverse()), affine(motion.end.inverse()));
         let world_from_camera = AnimatedTransform::new(start, end, t0, t1)?;
         let at = |time: f32| {
-            if world_from_camera.is_animated() {
-                from_affine(&world_from_camera.at(time))
-            } else {
-                Some(start)
-            }
+            if world_from_camera.is_animated() { from_affine(&world_from_camera.at(time)) } else { Some(start) }
         };
         let middle = at(0.5 * (t0 + t1))?;
         let render_from_world = match render_space {
@@ -271,7 +267,7 @@ fn model(
     }
 }
 
-/// In `f64` with pinned bits: the quaternion-free way to have them is a rotation's matrix.
+/// Read off a rotation's matrix, whose bits are the same on every platform.
 fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     Transform::rotate(degrees, [0.0, 0.0, 1.0]).map_or((0.0, 1.0), |t| (t.m[1][0], t.m[0][0]))
 }
@@ -284,10 +280,8 @@ fn elements(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<Element>> {
     if lens.is_empty() {
-        // A missing or broken lens file has been complained about where it was read.
-        if !diagnostics.has_errors() {
-            diagnostics.push(Diagnostic::error("E0914", "a realistic camera needs a lens", span).help("name a \"lensfile\""));
-        }
+        diagnostics
+            .push(Diagnostic::error("E0914", "a realistic camera needs a lens", span).help("name a \"lensfile\""));
         return None;
     }
     let mut elements = Vec::with_capacity(lens.len());
@@ -306,18 +300,15 @@ fn elements(
         if radius == 0.0 {
             let wanted = aperture_diameter.value as f64;
             if wanted > diameter {
-                let message = format!("the aperture of {wanted} mm is wider than the lens's widest, {diameter} mm, which is taken");
+                let message = format!(
+                    "the aperture of {wanted} mm is wider than the lens's widest, {diameter} mm, which is taken"
+                );
                 diagnostics.push(Diagnostic::warning("W0913", message, aperture_diameter.span));
             } else {
                 diameter = wanted;
             }
         }
-        elements.push(Element {
-            radius: radius * 1e-3,
-            thickness: thickness * 1e-3,
-            eta,
-            opening: 0.5e-3 * diameter,
-        });
+        elements.push(Element { radius: radius * 1e-3, thickness: thickness * 1e-3, eta, opening: 0.5e-3 * diameter });
     }
     Some(elements)
 }
@@ -357,12 +348,7 @@ fn focused(
 }
 
 /// The outer `None` is an error, the inner a circular hole.
-fn mask(
-    shape: &ApertureShape,
-    span: Span,
-    assets: &dyn Assets,
-    diagnostics: &mut Diagnostics,
-) -> Option<Option<Mask>> {
+fn mask(shape: &ApertureShape, span: Span, assets: &dyn Assets, diagnostics: &mut Diagnostics) -> Option<Option<Mask>> {
     let file = match shape {
         ApertureShape::Circular => return Some(None),
         ApertureShape::Gaussian => return Mask::gaussian().map(Some),

@@ -120,8 +120,7 @@ fn meet(element: &Element, z: f64, ray: &LensRay) -> Option<SurfaceHit> {
         return (t >= 0.0).then_some(SurfaceHit { t, normal: None });
     }
     let o = [ray.o[0], ray.o[1], ray.o[2] - (z - element.radius)];
-    let (t0, t1) =
-        quadratic(dot(ray.d, ray.d), 2.0 * dot(ray.d, o), dot(o, o) - element.radius * element.radius)?;
+    let (t0, t1) = quadratic(dot(ray.d, ray.d), 2.0 * dot(ray.d, o), dot(o, o) - element.radius * element.radius)?;
     // The surface is the cap around the vertex: the near half of the sphere for a ray that comes from outside of it.
     let t = if (ray.d[2] < 0.0) != (element.radius < 0.0) { t0 } else { t1 };
     if !(t >= 0.0) {
@@ -175,10 +174,11 @@ impl ThickLens {
         let from_film = LensRay { o: [height, 0.0, lens.rear_z() - 1.0], d: [0.0, 0.0, 1.0] };
         let (film_principal, film_focus) = cardinal(lens.from_scene(from_scene)?);
         let (scene_principal, scene_focus) = cardinal(lens.from_film(from_film)?.0);
-        [film_principal, film_focus, scene_principal, scene_focus]
-            .iter()
-            .all(|z| z.is_finite())
-            .then_some(Self { film_principal, film_focus, scene_principal })
+        [film_principal, film_focus, scene_principal, scene_focus].iter().all(|z| z.is_finite()).then_some(Self {
+            film_principal,
+            film_focus,
+            scene_principal,
+        })
     }
 
     /// Effective focal length; positive for a lens that gathers light.

@@ -74,14 +74,10 @@ impl Realistic {
                 Some((change(near.o, ray.o), change(near.d, ray.d)))
             })
         };
-        let offsets = neighbour(1.0, 0.0).zip(neighbour(0.0, 1.0)).map(
-            |((origin_x, direction_x), (origin_y, direction_y))| Offsets {
-                origin_x,
-                direction_x,
-                origin_y,
-                direction_y,
-            },
-        );
+        let offsets =
+            neighbour(1.0, 0.0).zip(neighbour(0.0, 1.0)).map(|((origin_x, direction_x), (origin_y, direction_y))| {
+                Offsets { origin_x, direction_x, origin_y, direction_y }
+            });
         let inside = difference(pupil, start);
         let cos2 = self.rear_z * self.rear_z / dot(inside, inside);
         let area = (x1 - x0) * (y1 - y0);

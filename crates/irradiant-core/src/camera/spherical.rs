@@ -1,8 +1,8 @@
 //! Cameras that see all around themselves.
 
 use super::{ModelRay, Offsets};
-use irradiant_math::warp::{equal_area_square_to_sphere, spherical_direction, wrap_equal_area_square};
 use irradiant_math::elementary::sin_cos;
+use irradiant_math::warp::{equal_area_square_to_sphere, spherical_direction, wrap_equal_area_square};
 use irradiant_math::{Affine, Point2, Vec3};
 use std::f32::consts::PI;
 

@@ -56,11 +56,8 @@ impl Materials {
             normal_map_ids: BTreeMap::new(),
             coat_depth_limit: None,
         };
-        let mut entries: Vec<Entry> = desc
-            .materials
-            .iter()
-            .map(|m| Entry { material: c.material(&m.kind), relief: c.relief(m) })
-            .collect();
+        let mut entries: Vec<Entry> =
+            desc.materials.iter().map(|m| Entry { material: c.material(&m.kind), relief: c.relief(m) }).collect();
         c.check_mixes(&mut entries);
         let (coats, normal_maps, coat_depth_limit) = (c.coats, c.normal_maps, c.coat_depth_limit);
         let names = desc.materials.iter().map(|m| m.name.clone().unwrap_or_else(|| kind_name(&m.kind).into()));
@@ -226,15 +223,19 @@ impl Compiler<'_> {
                 Material::Diffuse { reflectance: self.reflectance(reflectance, "the reflectance") }
             }
             MaterialKind::DiffuseTransmission { reflectance, transmittance, scale } => {
-                let (r, t) =
-                    (self.reflectance(reflectance, "the reflectance"), self.reflectance(transmittance, "the transmittance"));
+                let (r, t) = (
+                    self.reflectance(reflectance, "the reflectance"),
+                    self.reflectance(transmittance, "the transmittance"),
+                );
                 if !(scale.value.is_finite() && scale.value >= 0.0) {
                     self.error("E0707", format!("scale is {}; it must be at least 0", scale.value), scale.span);
                 }
-                let most = [r, t].iter().filter_map(|v| Some(self.textures.constant_spectrum(*v)?.max_value())).sum::<f32>();
+                let most =
+                    [r, t].iter().filter_map(|v| Some(self.textures.constant_spectrum(*v)?.max_value())).sum::<f32>();
                 if most * scale.value > 1.001 {
                     let sum = most * scale.value;
-                    let message = format!("reflectance and transmittance add up to {sum:.3}: the surface creates light");
+                    let message =
+                        format!("reflectance and transmittance add up to {sum:.3}: the surface creates light");
                     self.warning("W0707", message, reflectance.span);
                 }
                 Material::DiffuseTransmission { reflectance: r, transmittance: t, scale: scale.value }

@@ -104,7 +104,12 @@ pub enum Metal {
 impl Metal {
     /// eta and k.
     #[inline]
-    fn at(&self, textures: &Textures, tex: &TextureContext, lambda: &Wavelengths) -> (SampledSpectrum, SampledSpectrum) {
+    fn at(
+        &self,
+        textures: &Textures,
+        tex: &TextureContext,
+        lambda: &Wavelengths,
+    ) -> (SampledSpectrum, SampledSpectrum) {
         match *self {
             Self::Index { eta, k } => (textures.spectrum(eta, tex, lambda), textures.spectrum(k, tex, lambda)),
             Self::Reflectance(r) => {

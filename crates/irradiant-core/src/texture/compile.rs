@@ -188,7 +188,8 @@ pub(crate) fn spectrum(
         }
         if role == Role::Reflectance && v > 1.0 {
             let message = format!("{what} is {v}, but no surface reflects more than 1");
-            let help = "is this meant to shine? Light is said with AreaLightSource; a texture's \"scale\" is not limited";
+            let help =
+                "is this meant to shine? Light is said with AreaLightSource; a texture's \"scale\" is not limited";
             return Err(Box::new(Diagnostic::error("E0701", message, span).help(help)));
         }
         Ok(())
@@ -309,7 +310,8 @@ impl Compiler<'_> {
     fn octaves(&mut self, world_from_texture: &Transform, octaves: i32, omega: f32, span: Span) -> Option<Octaves> {
         const MOST: i32 = 64;
         if !(0..=MOST).contains(&octaves) || !omega.is_finite() {
-            let message = format!("{octaves} octaves of roughness {omega}: octaves are 0 to {MOST}, roughness is finite");
+            let message =
+                format!("{octaves} octaves of roughness {omega}: octaves are 0 to {MOST}, roughness is finite");
             self.error("E0610", message, span);
             return None;
         }
@@ -327,11 +329,13 @@ impl Compiler<'_> {
         input: impl Fn(&mut Self, &P) -> V,
         constant: impl FnOnce(&mut Self, f32) -> V,
     ) -> Built<V> {
-        let mapped = |c: &mut Self, mapping, node: &dyn Fn(Mapping) -> BasicNode<V>| {
-            match c.mapping(mapping, world_from_texture, span) {
-                Some(mapping) => Built::Basic(node(mapping)),
-                None => Built::Failed,
-            }
+        let mapped = |c: &mut Self, mapping, node: &dyn Fn(Mapping) -> BasicNode<V>| match c.mapping(
+            mapping,
+            world_from_texture,
+            span,
+        ) {
+            Some(mapping) => Built::Basic(node(mapping)),
+            None => Built::Failed,
         };
         match desc {
             BasicTexture::Constant(value) => Built::Value(input(self, value)),

@@ -235,9 +235,7 @@ impl<V: Copy> BasicNode<V> {
         let half = |a: V, b: V| input(a).times(0.5).plus(input(b).times(0.5));
         match self {
             Self::Scale { tex, scale } => input(*tex).times(textures.mean_float(*scale)),
-            Self::Mix { tex1, tex2, amount } => {
-                T::lerp(textures.mean_float(*amount), || input(*tex1), || input(*tex2))
-            }
+            Self::Mix { tex1, tex2, amount } => T::lerp(textures.mean_float(*amount), || input(*tex1), || input(*tex2)),
             Self::DirectionMix { tex1, tex2, .. }
             | Self::Checkerboard { tex1, tex2, .. }
             | Self::SolidCheckerboard { tex1, tex2, .. } => half(*tex1, *tex2),

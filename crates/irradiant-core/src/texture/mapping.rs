@@ -129,8 +129,7 @@ fn spherical(space: &Affine, at: &TextureContext) -> Coordinates {
     let rho2 = p.x * p.x + p.y * p.y;
     let (rho, r2) = (rho2.sqrt(), rho2 + p.z * p.z);
     let dphi = azimuth_gradient(p);
-    let dtheta =
-        if rho > 0.0 { Vec3::new(p.x * p.z / rho, p.y * p.z / rho, -rho) / (PI * r2) } else { Vec3::ZERO };
+    let dtheta = if rho > 0.0 { Vec3::new(p.x * p.z / rho, p.y * p.z / rho, -rho) / (PI * r2) } else { Vec3::ZERO };
     let phi = atan2(p.y, p.x);
     let phi = if phi < 0.0 { phi + 2.0 * PI } else { phi };
     let cos = if r2 > 0.0 { p.z / r2.sqrt() } else { 1.0 };

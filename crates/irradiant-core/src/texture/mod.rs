@@ -127,9 +127,7 @@ impl Textures {
     pub fn spectrum(&self, v: SpectrumValue, at: &TextureContext, lambda: &Wavelengths) -> SampledSpectrum {
         match v {
             SpectrumValue::Constant(id) => self.spectra[id.0 as usize].sample(lambda),
-            SpectrumValue::Node(_) if self.unfiltered => {
-                self.filtered_spectrum(v, &without_footprint(at), lambda)
-            }
+            SpectrumValue::Node(_) if self.unfiltered => self.filtered_spectrum(v, &without_footprint(at), lambda),
             SpectrumValue::Node(_) => self.filtered_spectrum(v, at, lambda),
         }
     }

@@ -139,7 +139,8 @@ mod tests {
     #[test]
     fn blurred_boards_are_grey() {
         assert!((checkerboard(&at(0.3, 0.7, 500.0)) - 0.5).abs() < 1e-4);
-        let wide = SolidCoordinates { p: Point3::new(0.1, 0.2, 0.3), dpdx: Vec3::splat(300.0), dpdy: Vec3::ZERO };
+        let wide =
+            SolidCoordinates { p: Point3::new(0.1, 0.2, 0.3), dpdx: Vec3::new(300.0, 300.0, 300.0), dpdy: Vec3::ZERO };
         assert!((solid_checkerboard(&wide) - 0.5).abs() < 1e-4);
         let sharp = |x, y, z| {
             solid_checkerboard(&SolidCoordinates { p: Point3::new(x, y, z), dpdx: Vec3::ZERO, dpdy: Vec3::ZERO })
@@ -180,8 +181,9 @@ mod tests {
 
     #[test]
     fn wind_is_the_product_of_two_octave_sums() {
-        let c = SolidCoordinates { p: Point3::new(1.3, -2.7, 5.1), dpdx: Vec3::splat(0.01), dpdy: Vec3::ZERO };
-        let gust = fbm(Point3::new(0.13, -0.27, 0.51), Vec3::splat(0.001), Vec3::ZERO, 0.5, 3).abs();
+        let c =
+            SolidCoordinates { p: Point3::new(1.3, -2.7, 5.1), dpdx: Vec3::new(0.01, 0.01, 0.01), dpdy: Vec3::ZERO };
+        let gust = fbm(Point3::new(0.13, -0.27, 0.51), Vec3::new(0.001, 0.001, 0.001), Vec3::ZERO, 0.5, 3).abs();
         assert!((windy(&c) - gust * fbm(c.p, c.dpdx, c.dpdy, 0.5, 6)).abs() < 1e-6);
     }
 }
