@@ -45,7 +45,10 @@ pub const CODES: &[(&str, &str)] = &[
     ("E0801", "A factor of a light (scale, power, illuminance) is a finite number; a scale is not negative."),
     ("E0802", "Emission cannot be negative at any wavelength, and a black body shines above 0 kelvin only."),
     ("E0803", "No built-in spectrum has this name: stdillum-D65, stdillum-F11 are some."),
-    ("E0804", "A direction or an angle of a light: \"from\" differs from \"to\", cones are up to 180 degrees, fields of view less."),
+    (
+        "E0804",
+        "A direction or an angle of a light: \"from\" differs from \"to\", cones are up to 180 degrees, fields of view less.",
+    ),
     (
         "E0805",
         "The image of a light cannot be used. Infinite and goniometric lights take square images under the equal-area \
@@ -63,8 +66,14 @@ pub const CODES: &[(&str, &str)] = &[
     ("E0911", "The transform of the camera is made of translations, rotations and scales that are not 0."),
     ("E0912", "A parameter of the camera is out of its range; the label says which is meant."),
     ("E0913", "The screen window is x0, x1, y0, y1 with x0 < x1 and y0 < y1."),
-    ("E0914", "A realistic camera needs a lens file: a line for each surface, with curvature radius, thickness, index, diameter in mm."),
-    ("E0915", "No light passes the lens: the aperture is too small, a surface is in the way, or the focus is too near."),
+    (
+        "E0914",
+        "A realistic camera needs a lens file: a line for each surface, with curvature radius, thickness, index, diameter in mm.",
+    ),
+    (
+        "E0915",
+        "No light passes the lens: the aperture is too small, a surface is in the way, or the focus is too near.",
+    ),
     ("E0916", "The image of the aperture is missing or cannot be used."),
     ("W0501", "Nothing shines in this scene, so the picture is black."),
     ("W0503", "A shape has no area: its limits leave nothing of it."),
@@ -78,12 +87,15 @@ pub const CODES: &[(&str, &str)] = &[
     ("W0707", "Reflectance and transmittance add up to more than 1: the surface creates light."),
     ("W0708", "The amount of a mix is cut to lie between 0 and 1."),
     ("W0709", "A material has a normal map and a displacement; the normal map counts, as in pbrt-v4."),
-    ("W0808", "Pixels of a light's image are negative or not finite; they are black. The first one is named."),
+    ("W0808", "Pixels of a light's image are negative or not finite; they count as 0. The first one is named."),
     ("W0809", "Lights do not move, and shapes of material \"interface\" do not emit, as in pbrt-v4."),
     ("W0810", "A value of a light has no effect."),
     ("W0910", "The shutter closes before it opens; the two times are swapped."),
     ("W0911", "The transform of the camera scales, and lens radius and focal distance with it."),
-    ("W0912", "This camera has no use for a lens radius in pbrt-v4's sense; the help says what happens."),
+    (
+        "W0912",
+        "An orthographic camera with a lens shows no parallel projection: rays start on a lens around its position, as in pbrt-v4.",
+    ),
     ("W0913", "The aperture asked for is wider than the lens allows; it is as wide as the lens."),
 ];
 
