@@ -237,7 +237,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
             self.error("E0502", message, phi_max.span, "phimax is a sweep in degrees, above 0 and at most 360");
             sound = false;
         }
-        if others.iter().any(|x| x.is_nan()) {
+        if sound && others.iter().any(|x| x.is_nan()) {
             self.error("E0503", "a limit of this shape is not a number", desc.span, "");
             sound = false;
         }

@@ -262,8 +262,8 @@ pub(crate) fn shade(at: &mut Interaction, ns: Normal3, dpdus: Vec3, dpdvs: Vec3,
     while at.dpdus.length_squared() > 1e16 && at.dpdus.is_finite()
         || at.dpdvs.length_squared() > 1e16 && at.dpdvs.is_finite()
     {
-        at.dpdus = at.dpdus / 1e8;
-        at.dpdvs = at.dpdvs / 1e8;
+        at.dpdus /= 1e8;
+        at.dpdvs /= 1e8;
     }
 }
 

@@ -1,0 +1,430 @@
+//! Materials: what a surface is made of, with parameters that may vary over it.
+//!
+//! [`Materials::bsdf`] turns a hit into a [`Bsdf`]: it chooses among mixed materials, bends the shading normal by bump or
+//! normal map, evaluates the textures, and makes the scattering model from numbers. It is called at every hit: it does
+//! not allocate, and what does not vary (microfacets, coats' tables) is worked out when the scene is compiled.
+//!
+//! **Wavelengths.** A dielectric whose index varies with wavelength bends each its own way: `bsdf` then ends all
+//! wavelengths of the path but the first. Nothing else here changes them.
+//!
+//! In reading order: this file (the enum and the hit), [`relief`] (bump and normal maps), `compile` (from the description).
+//!
+//! Semantics, defaults and expected values follow pbrt-v4 (Pharr, Jakob and Humphreys 2023, chapter 10); the kinds marked
+//! as Irradiant's own are documented with their models in [`bxdf`](crate::bxdf). Subsurface scattering, hair and measured
+//! BRDFs have diffuse stand-ins.
+
+pub mod relief;
+
+mod compile;
+
+use crate::bsdf::Bsdf;
+use crate::bxdf::{
+    Bxdf, Coat, CoatWeights, CoatedConductor, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission,
+    Filling, Ggx, GlossyPaint, Retroreflective, ThinDielectric, ThinFilm, ThinFilmPaint, WalkLimits,
+};
+use crate::interaction::{Interaction, MaterialId, TextureContext};
+use crate::sampler::MixDraw;
+use crate::texture::{FloatValue, SpectrumValue, Textures};
+use irradiant_math::Frame;
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
+use relief::{NormalMap, Relief};
+
+/// Microfacets, the same everywhere or varying.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Facets {
+    /// The same everywhere.
+    Constant(Ggx),
+    /// From textures.
+    Varying {
+        /// Along the first tangent.
+        u: FloatValue,
+        /// Along the second.
+        v: FloatValue,
+        /// Whether alpha is the square root of these.
+        remap: bool,
+    },
+}
+
+impl Facets {
+    #[inline]
+    fn at(&self, textures: &Textures, tex: &TextureContext) -> Ggx {
+        match *self {
+            Self::Constant(ggx) => ggx,
+            Self::Varying { u, v, remap } => {
+                let alpha = |roughness: FloatValue| {
+                    let r = textures.float(roughness, tex).max(0.0);
+                    if remap { Ggx::alpha_from_roughness(r) } else { r }
+                };
+                Ggx::new(alpha(u), alpha(v))
+            }
+        }
+    }
+}
+
+/// A real index of refraction, one for all wavelengths or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Index {
+    /// For all.
+    Constant(f32),
+    /// Each its own.
+    Dispersive(SpectrumValue),
+}
+
+impl Index {
+    /// The index that the path goes on with; ends the other wavelengths if they would go elsewhere.
+    #[inline]
+    fn at(&self, textures: &Textures, tex: &TextureContext, lambda: &mut Wavelengths) -> f32 {
+        match *self {
+            Self::Constant(eta) => eta,
+            Self::Dispersive(spectrum) => {
+                let lanes = textures.spectrum(spectrum, tex, lambda);
+                // In RGB one index stands for all: green's.
+                let eta = lanes[if lambda.basis == Basis::Rgb { 1 } else { 0 }];
+                lambda.terminate_secondary();
+                if eta == 0.0 { 1.0 } else { eta }
+            }
+        }
+    }
+}
+
+/// How a metal reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Metal {
+    /// By its complex index eta + i k.
+    Index {
+        /// Real part.
+        eta: SpectrumValue,
+        /// Imaginary part.
+        k: SpectrumValue,
+    },
+    /// By its reflectance at normal incidence.
+    Reflectance(SpectrumValue),
+}
+
+impl Metal {
+    /// eta and k.
+    #[inline]
+    fn at(
+        &self,
+        textures: &Textures,
+        tex: &TextureContext,
+        lambda: &Wavelengths,
+    ) -> (SampledSpectrum, SampledSpectrum) {
+        match *self {
+            Self::Index { eta, k } => (textures.spectrum(eta, tex, lambda), textures.spectrum(k, tex, lambda)),
+            Self::Reflectance(r) => {
+                let r = textures.spectrum(r, tex, lambda).clamp(0.0, 0.9999);
+                (SampledSpectrum::ONE, r.map(|r| 2.0 * (r / (1.0 - r)).sqrt()))
+            }
+        }
+    }
+}
+
+/// What lies between a coat and its base.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FillingValue {
+    albedo: SpectrumValue,
+    g: FloatValue,
+}
+
+/// A clear coat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoatValue {
+    /// Index into the tabulated coats, where nothing varies.
+    tabulated: Option<u32>,
+    eta: Index,
+    facets: Facets,
+    thickness: FloatValue,
+    filling: Option<FillingValue>,
+    limits: WalkLimits,
+}
+
+impl CoatValue {
+    #[inline]
+    fn filling(&self, textures: &Textures, tex: &TextureContext, lambda: &Wavelengths) -> Filling {
+        match self.filling {
+            None => Filling::NONE,
+            Some(FillingValue { albedo, g }) => Filling {
+                albedo: textures.spectrum(albedo, tex, lambda).clamp(0.0, 1.0),
+                g: textures.float(g, tex).clamp(-0.999, 0.999),
+            },
+        }
+    }
+
+    #[inline]
+    fn interface(&self, textures: &Textures, tex: &TextureContext, lambda: &mut Wavelengths) -> Dielectric {
+        Dielectric::new(self.eta.at(textures, tex, lambda), self.facets.at(textures, tex))
+    }
+}
+
+/// A material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Material {
+    /// Ideal diffuse reflection.
+    Diffuse {
+        /// In [0, 1].
+        reflectance: SpectrumValue,
+    },
+    /// Ideal diffuse reflection and transmission.
+    DiffuseTransmission {
+        /// Reflected share.
+        reflectance: SpectrumValue,
+        /// Transmitted share.
+        transmittance: SpectrumValue,
+        /// Factor of both.
+        scale: f32,
+    },
+    /// Metal.
+    Conductor {
+        /// How it reflects.
+        metal: Metal,
+        /// Its surface.
+        facets: Facets,
+    },
+    /// Interface of two clear media.
+    Dielectric {
+        /// Inside over outside.
+        eta: Index,
+        /// Its surface.
+        facets: Facets,
+    },
+    /// A clear pane.
+    ThinDielectric {
+        /// Of the pane.
+        eta: Index,
+    },
+    /// A clear coat over a diffuse base.
+    CoatedDiffuse {
+        /// Of the base.
+        reflectance: SpectrumValue,
+        /// Over it.
+        coat: CoatValue,
+    },
+    /// A clear coat over metal.
+    CoatedConductor {
+        /// Of the base.
+        metal: Metal,
+        /// Of the base.
+        facets: Facets,
+        /// Over it.
+        coat: CoatValue,
+    },
+    /// One of two, drawn at each hit.
+    Mix {
+        /// Which.
+        materials: [MaterialId; 2],
+        /// Chance of the second.
+        amount: FloatValue,
+    },
+    /// No surface at all.
+    Interface,
+    /// Irradiant's own: light returns to where it came from.
+    Retroreflective {
+        /// The returned share.
+        returned: SpectrumValue,
+        /// What the rest falls on.
+        base: SpectrumValue,
+        /// Spread of the return.
+        facets: Facets,
+    },
+    /// Irradiant's own: a lossless coat over a coloured body.
+    GlossyPaint {
+        /// Of the body.
+        reflectance: SpectrumValue,
+        /// Coats for evenly spaced alphas in [0, 1] when the roughness varies, or one.
+        coats: Coats,
+        /// Of the surface.
+        facets: Facets,
+    },
+    /// Irradiant's own: flakes with an interference film.
+    ThinFilmPaint {
+        /// nm.
+        thickness: FloatValue,
+        /// Index of the film.
+        film_eta: SpectrumValue,
+        /// Under the film.
+        metal: Metal,
+        /// Spread of the flakes.
+        facets: Facets,
+    },
+}
+
+/// A range of tabulated coats, by roughness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coats {
+    first: u32,
+    count: u32,
+}
+
+/// A material with its relief.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    material: Material,
+    relief: Relief,
+}
+
+/// All materials of a scene.
+#[derive(Clone, Debug)]
+pub struct Materials {
+    entries: Vec<Entry>,
+    names: Vec<String>,
+    coats: Vec<Coat>,
+    normal_maps: Vec<NormalMap>,
+    force_diffuse: bool,
+    coat_depth_limit: Option<u32>,
+}
+
+/// Samples with which a material's albedo is estimated when all are forced to be diffuse.
+const FORCED_DIFFUSE_SAMPLES: u32 = 16;
+
+impl Materials {
+    /// How light scatters at a hit; `None` where there is no surface (an interface, or no such material).
+    ///
+    /// `tex` is how the hit looks to textures. `mix` is asked once per level of mixed materials. May end all wavelengths
+    /// but the first, at dispersive dielectrics.
+    #[inline]
+    pub fn bsdf(
+        &self,
+        id: MaterialId,
+        textures: &Textures,
+        at: &Interaction,
+        tex: &TextureContext,
+        lambda: &mut Wavelengths,
+        mix: MixDraw<'_>,
+    ) -> Option<Bsdf> {
+        let mut entry = self.entries.get(id.0 as usize)?;
+        let mut level = 0;
+        while let Material::Mix { materials, amount } = entry.material {
+            let amount = textures.float(amount, tex);
+            let second = amount >= 1.0 || (amount > 0.0 && mix.get(level) <= amount);
+            level += 1;
+            entry = self.entries.get(materials[usize::from(second)].0 as usize)?;
+        }
+        let bxdf = self.bxdf(&entry.material, textures, tex, lambda)?;
+        let frame = match entry.relief {
+            Relief::Flat => Frame::from_z_near_x(at.ns.as_vec(), at.dpdus),
+            Relief::Bump(height) => relief::bump(height, textures, at, tex),
+            Relief::NormalMap(map) => self.normal_maps[map as usize].frame(at),
+        };
+        let bsdf = Bsdf::new(frame, bxdf);
+        if self.force_diffuse {
+            return Some(forced_diffuse(&bsdf, at));
+        }
+        Some(bsdf)
+    }
+
+    #[inline]
+    fn bxdf(
+        &self,
+        material: &Material,
+        textures: &Textures,
+        tex: &TextureContext,
+        lambda: &mut Wavelengths,
+    ) -> Option<Bxdf> {
+        let reflectance = |v, lambda: &Wavelengths| textures.spectrum(v, tex, lambda).clamp(0.0, 1.0);
+        Some(match material {
+            Material::Diffuse { reflectance: r } => Bxdf::Diffuse(Diffuse::new(reflectance(*r, lambda))),
+            Material::DiffuseTransmission { reflectance, transmittance, scale } => {
+                let share = |v| (textures.spectrum(v, tex, lambda) * *scale).clamp(0.0, 1.0);
+                Bxdf::DiffuseTransmission(DiffuseTransmission::new(share(*reflectance), share(*transmittance)))
+            }
+            Material::Conductor { metal, facets } => {
+                let (eta, k) = metal.at(textures, tex, lambda);
+                Bxdf::Conductor(Conductor::new(eta, k, facets.at(textures, tex)))
+            }
+            Material::Dielectric { eta, facets } => {
+                let facets = facets.at(textures, tex);
+                Bxdf::Dielectric(Dielectric::new(eta.at(textures, tex, lambda), facets))
+            }
+            Material::ThinDielectric { eta } => {
+                Bxdf::ThinDielectric(ThinDielectric::new(eta.at(textures, tex, lambda)))
+            }
+            Material::CoatedDiffuse { reflectance: r, coat } => {
+                let filling = coat.filling(textures, tex, lambda);
+                if let Some(i) = coat.tabulated {
+                    let r = reflectance(*r, lambda);
+                    Bxdf::CoatedDiffuse(CoatedDiffuse::new(&self.coats[i as usize], r, filling, coat.limits))
+                } else {
+                    let r = reflectance(*r, lambda);
+                    let (facets, thickness) = (coat.facets.at(textures, tex), textures.float(coat.thickness, tex));
+                    let eta = coat.eta.at(textures, tex, lambda);
+                    let walked = Coat::walked(eta, facets, thickness, CoatWeights::Pbrt);
+                    Bxdf::CoatedDiffuse(CoatedDiffuse::new(&walked, r, filling, coat.limits))
+                }
+            }
+            Material::CoatedConductor { metal, facets, coat } => {
+                let (eta, k) = metal.at(textures, tex, lambda);
+                let filling = coat.filling(textures, tex, lambda);
+                let interface = coat.interface(textures, tex, lambda);
+                Bxdf::CoatedConductor(CoatedConductor::new(
+                    interface,
+                    textures.float(coat.thickness, tex),
+                    CoatWeights::Pbrt,
+                    eta,
+                    k,
+                    facets.at(textures, tex),
+                    filling,
+                    coat.limits,
+                ))
+            }
+            // Resolved by the caller.
+            Material::Mix { .. } | Material::Interface => return None,
+            Material::Retroreflective { returned, base, facets } => Bxdf::Retroreflective(Retroreflective::new(
+                reflectance(*returned, lambda),
+                reflectance(*base, lambda),
+                facets.at(textures, tex),
+            )),
+            Material::GlossyPaint { reflectance: r, coats, facets } => {
+                let i = match coats.count {
+                    0 | 1 => 0,
+                    count => {
+                        let [x, y] = facets.at(textures, tex).alphas();
+                        let alpha = (x * y).sqrt().clamp(0.0, 1.0);
+                        (alpha * (count - 1) as f32 + 0.5) as u32
+                    }
+                };
+                let coat = &self.coats[(coats.first + i) as usize];
+                Bxdf::GlossyPaint(GlossyPaint::new(coat, reflectance(*r, lambda)))
+            }
+            Material::ThinFilmPaint { thickness, film_eta, metal, facets } => {
+                let (eta, k) = metal.at(textures, tex, lambda);
+                let film_eta = textures.spectrum(*film_eta, tex, lambda);
+                let thickness = textures.float(*thickness, tex).max(0.0);
+                let film = ThinFilm::new(thickness, film_eta, eta, k, 1.0, lambda.lambda);
+                Bxdf::ThinFilmPaint(ThinFilmPaint::new(film, facets.at(textures, tex), None))
+            }
+        })
+    }
+
+    /// How many there are, mixes included.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// The author's name of a material, or its kind.
+    pub fn name(&self, id: MaterialId) -> String {
+        self.names.get(id.0 as usize).cloned().unwrap_or_default()
+    }
+
+    /// A material.
+    pub fn get(&self, id: MaterialId) -> Option<&Material> {
+        self.entries.get(id.0 as usize).map(|e| &e.material)
+    }
+
+    /// The smallest depth to which walks within coats are followed, if any is limited: pictures lose light there.
+    pub fn coat_depth_limit(&self) -> Option<u32> {
+        self.coat_depth_limit
+    }
+}
+
+/// A diffuse model of about the same albedo (`Option "forcediffuse"`).
+#[cold]
+fn forced_diffuse(bsdf: &Bsdf, at: &Interaction) -> Bsdf {
+    let albedo = bsdf.rho_hd(at.wo, FORCED_DIFFUSE_SAMPLES).clamp(0.0, 1.0);
+    Bsdf::new(bsdf.frame, Bxdf::Diffuse(Diffuse::new(albedo)))
+}
