@@ -69,9 +69,9 @@ pub fn run(arguments: &CheckArguments) -> Exit {
 }
 
 fn explain(code: &str) -> Exit {
-    match irradiant::formats::explain(code) {
-        Some(text) => {
-            println!("{text}");
+    match irradiant::formats::pbrt::codes::explain(code) {
+        Some(entry) => {
+            println!("{}: {}\n\nFor example:\n\n{}", entry.code, entry.explanation, entry.example);
             Exit::Ok
         }
         None => {

@@ -2,7 +2,10 @@
 
 use crate::exit::Exit;
 use clap::Args;
-use irradiant::image::{Image, ImageError, ReadOptions, read_file};
+use irradiant::image::metrics::CompareError;
+use irradiant::image::{
+    FileFormat, FlipOptions, Image, ImageError, ReadOptions, compare, flip_hdr, flip_ldr, read_file,
+};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -24,31 +27,46 @@ pub fn run(arguments: &CompareArguments) -> Exit {
         (Ok(a), Ok(b)) => (a, b),
         (Err(exit), _) | (_, Err(exit)) => return exit,
     };
-    let comparison = match irradiant::image::compare(&a, &b) {
-        Ok(comparison) => comparison,
+    let measured = compare(&a, &b).and_then(|c| Ok((c, flip(&a, &b, &arguments.a)?)));
+    let (c, flip) = match measured {
+        Ok(measured) => measured,
         Err(why) => {
             eprintln!("cannot compare {} with {}: {why}", arguments.a.display(), arguments.b.display());
             return Exit::BadInput;
         }
     };
-    let c = &comparison;
     if arguments.json {
+        let worst = c.worst_tile.as_ref().map(|t| json!({ "x": t.x, "y": t.y, "mean_ratio": t.ratio }));
         let value = json!({
-            "mse": c.mse, "mae": c.mae, "relmse": c.rel_mse, "mape": c.mape, "psnr": c.psnr, "flip": c.flip,
-            "mean_ratio": c.mean_ratio,
-            "worst_tile": { "x": c.worst_tile.x, "y": c.worst_tile.y, "rel_mse": c.worst_tile.rel_mse },
-            "not_finite": c.not_finite,
+            "mse": c.mse, "mae": c.mae, "relmse": c.rel_mse, "mape": c.mape, "psnr": c.psnr, "flip": flip,
+            "mean_ratio": c.mean_ratio, "worst_tile": worst, "not_finite": c.not_finite,
         });
         println!("{}", serde_json::to_string_pretty(&value).unwrap_or_default());
     } else {
         println!("MSE         {:.6e}", c.mse);
         println!("relMSE      {:.6e}", c.rel_mse);
         println!("MAPE        {:.3} %", 100.0 * c.mape);
-        println!("FLIP        {:.5}", c.flip);
+        println!("FLIP        {flip:.5}");
         println!("mean ratio  {:.6}", c.mean_ratio);
-        println!("worst tile  at {}, {}: relMSE {:.6e}", c.worst_tile.x, c.worst_tile.y, c.worst_tile.rel_mse);
+        if let Some(t) = &c.worst_tile {
+            println!("worst tile  16 x 16 at {}, {}: mean ratio {:.5}", t.x, t.y, t.ratio);
+        }
+        if c.not_finite > 0 {
+            println!("not finite  {} values, left out", c.not_finite);
+        }
     }
     Exit::Ok
+}
+
+/// Mean FLIP difference: of displays for 8-bit pictures, of high dynamic range for others.
+fn flip(a: &Image, b: &Image, name: &Path) -> Result<f64, CompareError> {
+    let options = FlipOptions::default();
+    let display = matches!(
+        FileFormat::from_name(&name.to_string_lossy()),
+        Some(FileFormat::Png | FileFormat::Jpeg | FileFormat::Qoi | FileFormat::Bmp | FileFormat::Tga)
+    );
+    let flip = if display { flip_ldr(a, b, &options)? } else { flip_hdr(a, b, &options)? };
+    Ok(flip.mean)
 }
 
 /// Reads a picture as RGB, or says why not.

@@ -47,11 +47,12 @@ pub fn run(arguments: &ImageArguments) -> Exit {
         Tone::Reinhard => ToneCurve::Reinhard,
         Tone::Aces => ToneCurve::Aces,
     };
+    let tone = ToneOptions { exposure: arguments.exposure, curve, ..ToneOptions::default() };
     let converted = match format {
-        FileFormat::Exr | FileFormat::Pfm | FileFormat::Hdr => image,
-        _ => to_srgb8(&image, &ToneOptions { exposure: arguments.exposure, curve, ..ToneOptions::default() }),
+        FileFormat::Exr | FileFormat::Pfm | FileFormat::Hdr => Ok(image),
+        _ => to_srgb8(&image, &tone),
     };
-    match write(&converted, format).and_then(|bytes| atomic_write(&arguments.output, &bytes)) {
+    match converted.and_then(|i| write(&i, format)).and_then(|bytes| atomic_write(&arguments.output, &bytes)) {
         Ok(()) => Exit::Ok,
         Err(why) => {
             eprintln!("cannot write {}: {why}", arguments.output.display());

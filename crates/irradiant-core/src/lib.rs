@@ -2,10 +2,9 @@
 //!
 //! # Layout
 //! In reading order: [`interaction`] (where a path met something), [`geometry`] (what rays meet),
-//! [`texture`] (values over surfaces), [`material`] (what a surface is made of),
-//! [`bxdf`] and [`bsdf`] (how light scatters there), [`light`] (where it comes from) and [`light_sampler`] (which light
-//! to ask), [`camera`] (where paths begin), [`sampler`] (random numbers), [`film`] (sums and counts).
-//! Nothing here reads files, clocks or the environment.
+//! [`bxdf`] and [`bsdf`] (how light scatters there), [`material`] and [`texture`] (what decides that), [`light`] and
+//! [`light_sampler`], [`camera`], [`sampler`] (random numbers), [`film`] (sums and counts), and [`scene`], which holds
+//! them all. Nothing here reads files, clocks or the environment.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -20,4 +19,5 @@ pub mod light;
 pub mod light_sampler;
 pub mod material;
 pub mod sampler;
+pub mod scene;
 pub mod texture;

@@ -455,6 +455,18 @@ const FACTS: &[Fact] = &[
             if is_rgb(tex1, [1.0, 0.0, 0.0]) && is_constant(tex2, 0.0) && *u_scale == 4.0 && *v_scale == 1.0)
         },
     ),
+    ("checkerboard, nothing said", "WorldBegin Texture \"t\" \"float\" \"checkerboard\"", |d| {
+        matches!(float_texture(d), FloatTextureKind::Basic(BasicTexture::Checkerboard { tex1, tex2, .. })
+            if value(tex1) == 1.0 && value(tex2) == 0.0)
+    }),
+    ("mix, nothing said", "WorldBegin Texture \"t\" \"float\" \"mix\"", |d| {
+        matches!(float_texture(d), FloatTextureKind::Basic(BasicTexture::Mix { tex1, tex2, amount })
+            if value(tex1) == 0.0 && value(tex2) == 1.0 && value(amount) == 0.5)
+    }),
+    ("bilerp, nothing said", "WorldBegin Texture \"t\" \"float\" \"bilerp\"", |d| {
+        matches!(float_texture(d), FloatTextureKind::Basic(BasicTexture::Bilerp { v00, v01, v10, v11, .. })
+            if value(v00) == 0.0 && value(v01) == 1.0 && value(v10) == 0.0 && value(v11) == 1.0)
+    }),
     ("image map", "WorldBegin Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"", |d| {
         matches!(spectrum_texture(d), SpectrumTextureKind::Basic(BasicTexture::ImageMap(m))
             if m.filter == ImageFilter::Bilinear && m.wrap == ImageWrap::Repeat && m.scale == 1.0 && !m.invert

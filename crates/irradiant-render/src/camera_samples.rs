@@ -11,13 +11,13 @@ use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
 /// A sample on its way: random numbers, wavelengths, the camera's ray.
 #[derive(Clone, Copy)]
-pub struct CameraSample {
+pub struct CameraSample<'a> {
     /// Pixel.
     pub pixel: [i32; 2],
     /// Sample index.
     pub index: u32,
     /// Its random numbers.
-    pub stream: SampleStream,
+    pub stream: SampleStream<'a>,
     /// Its wavelengths, before any vertex has ended the secondary ones.
     pub lambda: Wavelengths,
     /// Weight of the pixel filter (mean 1).
@@ -28,7 +28,7 @@ pub struct CameraSample {
 
 /// Draws the camera's part of a sample.
 #[inline]
-pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample {
+pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample<'_> {
     let stream = scene.sampler.stream(pixel, index);
     let draws = stream.camera();
     let lambda = scene.sample_wavelengths(draws.wavelength);

@@ -9,11 +9,12 @@ use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::TransportMode;
+use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
 use irradiant_core::interaction::{Interaction, ReferencePoint};
 use irradiant_core::light::SampleMode;
+use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::sampler::SampleStream;
 use irradiant_core::scene::Scene;
 use irradiant_math::Ray;
@@ -114,7 +115,7 @@ impl PathIntegrator {
             // The next direction.
             let draws = stream.scatter(depth);
             let wo = at.wo;
-            let Some(sample) = bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance) else {
+            let Some(sample) = bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
                 break PathEnd::Absorbed;
             };
             depth += 1;
@@ -126,7 +127,7 @@ impl PathIntegrator {
             }
             let specular = sample.lobe.is_specular();
             let bsdf_pdf = if sample.pdf_is_proportional && !specular {
-                bsdf.pdf(wo, sample.wi, TransportMode::Radiance)
+                bsdf.pdf(wo, sample.wi, TransportMode::Radiance, Sides::All)
             } else {
                 sample.pdf
             };
@@ -172,14 +173,14 @@ impl PathIntegrator {
     ) -> SampledSpectrum {
         recorder.escape(depth, ray.d);
         let mut sum = SampledSpectrum::ZERO;
-        for &light in scene.lights.infinite() {
-            let emitted = scene.lights[light].escaped(ray.d, lambda);
+        for &light in scene.lights.environments() {
+            let emitted = scene.lights.get(light).escaped(ray, lambda);
             if emitted.is_black() {
                 continue;
             }
             let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
                 scene.light_sampler.pmf(&p.reference, light)
-                    * scene.lights[light].pdf_escaped(&p.reference, ray.d, SampleMode::Incomplete)
+                    * scene.lights.get(light).pdf_escaped(&p.reference, ray.d, SampleMode::Compensated)
             });
             let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
@@ -211,12 +212,12 @@ impl PathIntegrator {
         recorder: &mut R,
     ) -> SampledSpectrum {
         let Some(light) = at.light else { return SampledSpectrum::ZERO };
-        let emitted = scene.lights[light].emitted(at, at.wo, lambda);
+        let emitted = scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
         if emitted.is_black() {
             return SampledSpectrum::ZERO;
         }
         let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
-            scene.light_sampler.pmf(&p.reference, light) * scene.lights[light].pdf_hit(&p.reference, ray.d, at)
+            scene.light_sampler.pmf(&p.reference, light) * scene.lights.get(light).pdf_hit(&p.reference, ray.d, &at.into())
         });
         let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
         let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
@@ -248,10 +249,10 @@ fn direct_light<R: PathRecorder>(
 ) -> SampledSpectrum {
     let draws = stream.light(depth);
     let reference = at.reference();
-    let Some((light, pmf)) = scene.light_sampler.sample(&reference, draws.pick) else {
+    let Some(PickedLight { id: light, pmf }) = scene.light_sampler.sample(&reference, draws.pick) else {
         return SampledSpectrum::ZERO;
     };
-    let Some(sample) = scene.lights[light].sample(&reference, draws.uv, lambda, SampleMode::Incomplete) else {
+    let Some(sample) = scene.lights.get(light).sample(&reference, draws.uv, lambda, SampleMode::Compensated) else {
         return SampledSpectrum::ZERO;
     };
     let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);

@@ -32,7 +32,7 @@ impl Integrator for RandomWalkIntegrator {
                 };
                 let at = scene.geometry.interaction(&ray, &hit);
                 if let Some(light) = at.light {
-                    radiance += throughput * scene.lights[light].emitted(&at, at.wo, lambda);
+                    radiance += throughput * scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
                 let mix = sample.stream.mix(depth);

@@ -3,9 +3,10 @@
 
 use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use irradiant_core::bxdf::TransportMode;
+use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::film::FilmTile;
 use irradiant_core::light::SampleMode;
+use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Ray, Vec3, warp};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
@@ -39,7 +40,7 @@ impl Integrator for SimplePathIntegrator {
                 };
                 let at = scene.geometry.interaction(&ray, &hit);
                 if let (true, Some(light)) = (count_emission, at.light) {
-                    radiance += throughput * scene.lights[light].emitted(&at, at.wo, lambda);
+                    radiance += throughput * scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
                 let mix = sample.stream.mix(depth);
@@ -59,9 +60,9 @@ impl Integrator for SimplePathIntegrator {
                 }
                 if self.sample_lights && bsdf.flags().is_non_specular() {
                     let draws = sample.stream.light(depth);
-                    if let Some((light, pmf)) = scene.light_sampler.sample(&at.reference(), draws.pick)
+                    if let Some(PickedLight { id: light, pmf }) = scene.light_sampler.sample(&at.reference(), draws.pick)
                         && let Some(s) =
-                            scene.lights[light].sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
+                            scene.lights.get(light).sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
                     {
                         let f = bsdf.f(at.wo, s.wi, TransportMode::Radiance) * s.wi.dot(bsdf.frame.z).abs();
                         if !f.is_black() {
@@ -74,7 +75,7 @@ impl Integrator for SimplePathIntegrator {
                 }
                 let draws = sample.stream.scatter(depth);
                 let wi = if self.sample_bsdf {
-                    let Some(s) = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance) else { break };
+                    let Some(s) = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else { break };
                     throughput *= s.f * (s.wi.dot(bsdf.frame.z).abs() / s.pdf);
                     count_emission = !self.sample_lights || s.lobe.is_specular();
                     s.wi
@@ -118,7 +119,7 @@ impl Integrator for SimplePathIntegrator {
 
 /// All environments along a ray.
 pub(crate) fn environment(scene: &Scene, ray: &Ray, lambda: &Wavelengths) -> SampledSpectrum {
-    scene.lights.infinite().iter().fold(SampledSpectrum::ZERO, |sum, &l| sum + scene.lights[l].escaped(ray.d, lambda))
+    scene.lights.environments().iter().fold(SampledSpectrum::ZERO, |sum, &l| sum + scene.lights.get(l).escaped(ray, lambda))
 }
 
 /// Uniform over the directions that the surface can scatter to: a hemisphere or the sphere.

@@ -173,6 +173,15 @@ impl Diagnostics {
         self.list.iter().filter_map(|d| d.not_honoured.as_deref())
     }
 
+    /// Makes errors of what is not honoured (`--strict`).
+    pub fn promote_not_honoured(&mut self) {
+        for diagnostic in &mut self.list {
+            if diagnostic.not_honoured.is_some() {
+                diagnostic.severity = Severity::Error;
+            }
+        }
+    }
+
     /// Number of complaints.
     pub fn len(&self) -> usize {
         self.list.len()

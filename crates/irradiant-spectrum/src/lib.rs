@@ -42,7 +42,7 @@ pub use emission::{Blackbody, blackbody, daylight};
 pub use photometry::{CIE_Y_INTEGRAL, inner_product, spectrum_to_photometric, spectrum_to_xyz};
 pub use rgb::{RgbAlbedo, RgbIlluminant, RgbUnbounded};
 pub use sampled::SampledSpectrum;
-pub use sensor::Sensor;
+pub use sensor::{Sensor, SensorError};
 pub use stored::{Curve, Role, Spectrum, SpectrumError};
 pub use table::Table;
 pub use uplift::SigmoidPolynomial;

@@ -44,37 +44,37 @@ pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, Error> {
     if path == Path::new("-") {
         let mut text = Vec::new();
         std::io::Read::read_to_end(&mut std::io::stdin().lock(), &mut text).map_err(unreadable)?;
-        return read("<stdin>", text.into(), FileAssets::new("."));
+        return read("<stdin>", text.into(), FileAssets::below("."), Path::new("."));
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let assets = FileAssets::new(folder);
+    let assets = FileAssets::beside(path);
     let text = assets.read(path).map_err(|why| {
         unreadable(match why {
             AssetError::NotFound => std::io::Error::from(std::io::ErrorKind::NotFound),
             other => std::io::Error::other(other.to_string()),
         })
     })?;
-    read(&path.display().to_string(), text, assets)
+    read(&path.display().to_string(), text, assets, folder)
 }
 
 /// Reads a scene from text; files that it mentions are looked for in `folder`.
 pub fn load_text(name: &str, text: &str, folder: impl AsRef<Path>) -> Result<SceneFile, Error> {
-    read(name, text.as_bytes().into(), FileAssets::new(folder.as_ref()))
+    read(name, text.as_bytes().into(), FileAssets::below(folder.as_ref()), folder.as_ref())
 }
 
 /// The built-in scene: the Cornell box from Cornell's measured geometry, reflectances and lamp, without depth limit.
 pub fn cornell_box() -> SceneFile {
     let text = include_str!("../../../scenes/cornell-box.pbrt");
-    let mut scene = read("cornell-box.pbrt (built in)", text.as_bytes().into(), FileAssets::new("."))
+    let mut scene = read("cornell-box.pbrt", text.as_bytes().into(), FileAssets::below("."), Path::new("."))
         .unwrap_or_else(|e| unreachable!("the built-in scene is valid: {e}"));
     scene.unlimited_depth = true;
     scene
 }
 
-fn read(name: &str, text: Arc<[u8]>, files: FileAssets) -> Result<SceneFile, Error> {
-    let assets = HashingAssets { files, hashes: Mutex::default() };
+fn read(name: &str, text: Arc<[u8]>, files: FileAssets, folder: &Path) -> Result<SceneFile, Error> {
+    let assets = HashingAssets { files, folder: folder.to_owned(), hashes: Mutex::default() };
     let main_hash = blake3::hash(&text);
-    let parsed = irradiant_formats::read(name, text, &assets);
+    let parsed = irradiant_formats::format_of(Path::new(name)).read(name, text, &assets);
     let report = Report { diagnostics: parsed.diagnostics, sources: parsed.sources };
     if report.diagnostics.has_errors() {
         return Err(Error::Scene(Box::new(report)));
@@ -85,6 +85,7 @@ fn read(name: &str, text: Arc<[u8]>, files: FileAssets) -> Result<SceneFile, Err
 /// Files, with a hash of each that was read: two renders whose hashes differ are of different scenes.
 pub(crate) struct HashingAssets {
     files: FileAssets,
+    folder: PathBuf,
     hashes: Mutex<BTreeMap<String, blake3::Hash>>,
 }
 
@@ -92,7 +93,7 @@ impl Assets for HashingAssets {
     fn read(&self, path: &Path) -> Result<Arc<[u8]>, AssetError> {
         let bytes = self.files.read(path)?;
         // Named relative to the scene, so that a moved folder is still the same scene.
-        let name = path.strip_prefix(self.files.root()).unwrap_or(path).to_string_lossy().replace('\\', "/");
+        let name = path.strip_prefix(&self.folder).unwrap_or(path).to_string_lossy().replace('\\', "/");
         self.hashes.lock().unwrap_or_else(|e| e.into_inner()).insert(name, blake3::hash(&bytes));
         Ok(bytes)
     }

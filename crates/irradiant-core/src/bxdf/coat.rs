@@ -201,7 +201,7 @@ impl Coat {
                 } else {
                     f64::from(fresnel_dielectric(-(mu as f32), self.interface.eta))
                 };
-                sum += weight * f * (-2.0 * t / mu).exp();
+                sum += weight * f * f64::from(exp((-2.0 * t / mu) as f32));
             }
         }
         sum as f32
@@ -219,7 +219,7 @@ impl Coat {
             let u = Point2::new(b, c);
             if let Some(s) = self.interface.sample_interface(wo, 0.0, u, TransportMode::Radiance, Sides::Reflection) {
                 let path = f64::from(self.thickness) * (1.0 / f64::from(mu) + 1.0 / f64::from(s.wi.z.abs()));
-                sum += f64::from(s.weight) * (-path).exp();
+                sum += f64::from(s.weight) * f64::from(exp(-path as f32));
             }
         }
         (sum / n as f64) as f32
@@ -237,7 +237,7 @@ impl Coat {
                 continue;
             };
             let inside = s.wi.z.abs();
-            let mut value = f64::from(s.weight) * (-f64::from(self.thickness) / f64::from(inside)).exp();
+            let mut value = f64::from(s.weight * exp(-self.thickness / inside));
             if weights == CoatWeights::Pbrt {
                 // Its two weights: exit direction first, against the base's cosine density; and the other way around,
                 // but against the density of going out to w instead of that of coming in from it.

@@ -278,6 +278,9 @@ fn spots_fall_off_smoothly_between_their_angles() {
     assert!(intensity(40.1) == 0.0 && intensity(180.0) == 0.0 && intensity(39.5) > 0.0);
     let middle = (0.5 * (cos(40f32.to_radians()) + cos(25f32.to_radians()))).acos().to_degrees();
     assert!((intensity(middle) - 0.5).abs() < 1e-3);
+    // Smooth, not linear: 3 t^2 - 2 t^3 at t = 1/4.
+    let quarter = (0.75 * cos(40f32.to_radians()) + 0.25 * cos(25f32.to_radians())).acos().to_degrees();
+    assert!((intensity(quarter) - 0.15625).abs() < 1e-3);
 }
 
 #[test]
@@ -418,10 +421,13 @@ fn sampled_densities_are_those_that_hits_report() {
         }
     }
     let complete = SampleMode::Complete;
+    let mut stretched = infinite(None, Some("sky"), None);
+    stretched.world_from_light = MotionDesc::still(Transform::scale(-1.0, 2.0, 0.7).unwrap());
     for l in [
         infinite(None, Some("sky"), None),
         infinite(None, Some("sky"), Some(PORTAL)),
         infinite(Some(WHITE), None, None),
+        stretched,
     ] {
         let l = one(l);
         let here = at(0.1, 0.2, -0.5, Vec3::Z);

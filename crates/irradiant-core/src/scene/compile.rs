@@ -1,19 +1,23 @@
-//! From a description to a scene: each floor compiles its own part; here they are put together in the one order that
-//! works.
+//! From a description to a scene: each part compiles itself; here they are put together in the one order that works.
 
-use super::{Facts, LayerPlan, Scene, SceneAlpha};
-use crate::camera::{self, FootprintEstimator};
+use super::{Facts, LayerPlan, Scene};
+use crate::camera::{self, CompiledCamera};
 use crate::film::PixelBounds;
 use crate::film::filter::Filter;
-use crate::geometry::Geometry;
-use crate::light::Lights;
+use crate::geometry::{Geometry, compile_geometry};
+use crate::interaction::MaterialId;
+use crate::light::{LightContext, Lights};
 use crate::light_sampler::LightSampler;
 use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
-use irradiant_scene::desc::{ColorSpaceName, FilmDesc, SceneDesc};
-use irradiant_scene::{Assets, Diagnostic, Diagnostics};
-use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, Spectrum};
+use irradiant_image::{Image, ReadOptions};
+use irradiant_scene::desc::{
+    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilterKind, SceneDesc,
+};
+use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
+use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
+use std::sync::Arc;
 
 /// What a caller may set over the description.
 #[derive(Clone, Copy, Debug)]
@@ -40,25 +44,271 @@ impl Default for CompileOptions {
 pub struct Compiled {
     /// None when there are errors.
     pub scene: Option<Scene>,
-    /// All of them.
+    /// All complaints.
     pub diagnostics: Diagnostics,
 }
 
 /// The colour space of a name.
 pub fn color_space(name: ColorSpaceName) -> &'static ColorSpace {
-    match name {
-        ColorSpaceName::Srgb => ColorSpace::srgb(),
-        ColorSpaceName::DciP3 => ColorSpace::dci_p3(),
-        ColorSpaceName::Rec2020 => ColorSpace::rec2020(),
-        ColorSpaceName::Aces2065_1 => ColorSpace::aces2065_1(),
-    }
+    ColorSpace::named(name.name()).unwrap_or(ColorSpace::srgb())
 }
 
 impl Scene {
-    /// Compiles a description; never fails early: all errors come at once.
+    /// Compiles a description; never stops early: all errors come at once.
     pub fn compile(desc: &SceneDesc, assets: &dyn Assets, options: &CompileOptions) -> Compiled {
         let mut diagnostics = Diagnostics::default();
         let scene = compile(desc, assets, options, &mut diagnostics);
         Compiled { scene: scene.filter(|_| !diagnostics.has_errors()), diagnostics }
+    }
+}
+
+fn compile(
+    desc: &SceneDesc,
+    assets: &dyn Assets,
+    options: &CompileOptions,
+    diagnostics: &mut Diagnostics,
+) -> Option<Scene> {
+    // Settings that the caller may override come first: the rest depends on them.
+    let mut film = desc.film.clone();
+    if let Some(resolution) = options.resolution {
+        film.resolution.value = resolution;
+    }
+    if options.crop.is_some() {
+        (film.crop_window, film.pixel_bounds) = (options.crop.map(Spanned::unplaced), None);
+    }
+    let bounds = pixel_bounds(&film, diagnostics);
+    check_filter(desc, diagnostics);
+    let samples_per_pixel = options.samples_per_pixel.unwrap_or(desc.sampler.samples_per_pixel.value).max(1);
+    let seed = options.seed.or(desc.sampler.seed).unwrap_or(desc.options.seed);
+    let space = color_space(film.color_space);
+
+    let camera = camera::compile(
+        &desc.camera,
+        &film,
+        samples_per_pixel,
+        desc.options.render_space,
+        assets,
+        diagnostics,
+    );
+    let exposure_time = film.exposure_time.map(|t| t.value).or(camera.as_ref().map(|c| c.exposure_time));
+    let sensor = sensor(&film, exposure_time.unwrap_or(1.0), space, diagnostics);
+    let render_from_world = camera.as_ref().map(|c| c.render_from_world).unwrap_or_default();
+
+    let mut textures = Textures::compile(desc, &render_from_world, assets, space, diagnostics);
+    let materials = Materials::compile(desc, &mut textures, assets, space, diagnostics);
+    let material_id = |m: irradiant_scene::desc::MaterialRef| MaterialId(m.0);
+    let mut geometry = compile_geometry(desc, &render_from_world, material_id, diagnostics);
+    let lights = compile_lights(desc, &mut geometry, &render_from_world, space, assets, diagnostics);
+    if lights.is_empty() {
+        diagnostics.push(
+            Diagnostic::warning("W0501", "there is no light in the scene: the picture will be black", Span::NONE)
+                .help("add a LightSource or an AreaLightSource"),
+        );
+    }
+
+    let (Some(camera), Some(bounds), Some(sensor)) = (camera, bounds, sensor) else { return None };
+    let CompiledCamera { camera, camera_from_world, footprint, .. } = camera;
+    let light_sampler = LightSampler::new(desc.integrator.light_sampler, &lights);
+    let layers = LayerPlan::new(
+        &film,
+        &camera_from_world.compose(&render_from_world.inverse()),
+        &render_from_world.inverse(),
+    );
+    let rgb_from_sensor = sensor.output_rgb_from_sensor_rgb(space, options.basis);
+    let white = Spectrum::rgb([1.0; 3], Role::Illuminant, space);
+    let white = white.scaled(1.0 / irradiant_spectrum::spectrum_to_photometric(&white));
+    let filtered = !desc.options.disable_texture_filtering && textures.needs_footprint();
+    let facts = facts(desc, &geometry, &materials, &textures, &lights);
+    let mut limits: Vec<String> = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    if film.max_component_value.is_finite() {
+        limits.push(format!("maxcomponentvalue {} (biased)", film.max_component_value.value));
+    }
+
+    Some(Scene {
+        geometry,
+        materials,
+        textures,
+        light_sampler,
+        lights,
+        camera,
+        filter: Filter::new(&desc.filter),
+        sampler: Sampler::new(desc.sampler.kind, samples_per_pixel, film.resolution.value, seed),
+        layers,
+        samples_per_pixel,
+        seed,
+        basis: options.basis,
+        sensor,
+        color_space: space,
+        rgb_from_sensor,
+        max_component: film.max_component_value.value,
+        white,
+        resolution: film.resolution.value,
+        bounds,
+        footprint: filtered.then_some(footprint),
+        render_from_world,
+        camera_from_world,
+        pixel_jitter: !desc.options.disable_pixel_jitter,
+        wavelength_jitter: !desc.options.disable_wavelength_jitter,
+        limits,
+        facts,
+    })
+}
+
+/// The pixels to render: the author's bounds, or the part of the image that the crop window says.
+fn pixel_bounds(film: &FilmDesc, diagnostics: &mut Diagnostics) -> Option<PixelBounds> {
+    const LARGEST: u32 = 1 << 16;
+    let [width, height] = film.resolution.value;
+    if !((1..=LARGEST).contains(&width) && (1..=LARGEST).contains(&height)) {
+        let message = format!("a film of {width} x {height} pixels");
+        diagnostics.push(
+            Diagnostic::error("E0901", message, film.resolution.span)
+                .help(format!("each side must be from 1 to {LARGEST} pixels")),
+        );
+        return None;
+    }
+    let full = PixelBounds { x0: 0, y0: 0, x1: width as i32, y1: height as i32 };
+    let (bounds, span) = match (&film.pixel_bounds, &film.crop_window) {
+        (Some(b), _) => {
+            let [x0, x1, y0, y1] = b.value;
+            (PixelBounds { x0, y0, x1, y1 }.intersection(&full), b.span)
+        }
+        (None, Some(crop)) => {
+            let at = |fraction: f32, size: u32| (fraction.clamp(0.0, 1.0) * size as f32).ceil() as i32;
+            let [x0, x1, y0, y1] = crop.value;
+            (
+                PixelBounds { x0: at(x0, width), y0: at(y0, height), x1: at(x1, width), y1: at(y1, height) },
+                crop.span,
+            )
+        }
+        (None, None) => (full, film.span),
+    };
+    if bounds.area() == 0 {
+        diagnostics.push(
+            Diagnostic::error("E0902", "no pixel is left to render", span)
+                .help("bounds are x0 x1 y0 y1, inside the film, with x0 < x1 and y0 < y1"),
+        );
+        return None;
+    }
+    Some(bounds)
+}
+
+fn check_filter(desc: &SceneDesc, diagnostics: &mut Diagnostics) {
+    for radius in [desc.filter.x_radius, desc.filter.y_radius] {
+        if !(radius.value > 0.0 && radius.value <= 1e4) {
+            let message = format!("a pixel filter of radius {}", radius.value);
+            diagnostics.push(
+                Diagnostic::error("E0903", message, radius.span).help("radii are half-widths in pixels, more than 0"),
+            );
+        }
+    }
+    let positive = match desc.filter.kind {
+        FilterKind::Gaussian { sigma } => Some(sigma),
+        FilterKind::Sinc { tau } => Some(tau),
+        FilterKind::Box | FilterKind::Triangle | FilterKind::Mitchell { .. } => None,
+    };
+    if let Some(value) = positive.filter(|v| !(v.value > 0.0 && v.value.is_finite())) {
+        diagnostics.push(
+            Diagnostic::error("E0904", format!("{} is out of range", value.value), value.span).help("must be more than 0"),
+        );
+    }
+}
+
+fn sensor(
+    film: &FilmDesc,
+    exposure_time: f32,
+    space: &'static ColorSpace,
+    diagnostics: &mut Diagnostics,
+) -> Option<Sensor> {
+    if !(exposure_time > 0.0 && film.iso.value > 0.0 && film.white_balance.value >= 0.0) {
+        diagnostics.push(
+            Diagnostic::error("E0905", "exposure time, iso and white balance must be positive", film.span)
+                .help("the exposure time is shutterclose - shutteropen unless the film says otherwise"),
+        );
+        return None;
+    }
+    match Sensor::new(&film.sensor.value, film.iso.value, exposure_time, film.white_balance.value, space) {
+        Ok(sensor) => Some(sensor),
+        Err(why) => {
+            let near = irradiant_scene::diagnostic::did_you_mean(&film.sensor.value, Sensor::names());
+            let help = match (&why, near) {
+                (SensorError::Unknown(_), Some(near)) => format!("did you mean \"{near}\"?"),
+                (SensorError::Unknown(_), None) => format!("known are {}", Sensor::names().collect::<Vec<_>>().join(", ")),
+                (SensorError::Singular(_), _) => "try another white balance temperature".into(),
+            };
+            diagnostics.push(Diagnostic::error("E0906", why.to_string(), film.sensor.span).help(help));
+            None
+        }
+    }
+}
+
+fn compile_lights(
+    desc: &SceneDesc,
+    geometry: &mut Geometry,
+    render_from_world: &irradiant_math::Transform,
+    space: &'static ColorSpace,
+    assets: &dyn Assets,
+    diagnostics: &mut Diagnostics,
+) -> Lights {
+    let mut load_image =
+        |file: &Spanned<FileDesc>, diagnostics: &mut Diagnostics| load_image(file, assets, diagnostics);
+    let mut context = LightContext {
+        render_from_world,
+        scene_bounds: geometry.bounds(),
+        color_space: space,
+        load_image: &mut load_image,
+    };
+    Lights::compile(desc, geometry, &mut context, diagnostics)
+}
+
+/// Reads and decodes an image, or says where the scene asks for it and what is wrong.
+pub(crate) fn load_image(
+    file: &Spanned<FileDesc>,
+    assets: &dyn Assets,
+    diagnostics: &mut Diagnostics,
+) -> Option<Arc<Image>> {
+    let bytes = match assets.read(&file.path) {
+        Ok(bytes) => bytes,
+        Err(why) => {
+            let message = format!("image \"{}\": {why}", file.name);
+            let help = format!("tried {}", file.path.display());
+            diagnostics.push(Diagnostic::error("E0601", message, file.span).help(help).missing());
+            return None;
+        }
+    };
+    match irradiant_image::read(&bytes, &file.name, &ReadOptions::default()) {
+        Ok(image) => Some(Arc::new(image)),
+        Err(why) => {
+            let message = format!("image \"{}\": {why}", file.name);
+            diagnostics.push(Diagnostic::error("E0602", message, file.span));
+            None
+        }
+    }
+}
+
+fn facts(desc: &SceneDesc, geometry: &Geometry, materials: &Materials, textures: &Textures, lights: &Lights) -> Facts {
+    let (triangles, other_primitives) = geometry.n_primitives();
+    let (n_textures, images, image_bytes) = textures.counts();
+    let area_lights = lights.as_slice().iter().filter(|l| matches!(l, crate::light::Light::Area(_))).count();
+    Facts {
+        camera: match &desc.camera.kind {
+            CameraKind::Perspective { .. } => "perspective",
+            CameraKind::Orthographic { .. } => "orthographic",
+            CameraKind::Spherical { .. } => "spherical",
+            CameraKind::Realistic { .. } => "realistic",
+        }
+        .into(),
+        shapes: geometry.n_shapes(),
+        triangles,
+        other_primitives,
+        instances: desc.instances.len(),
+        materials: materials.len(),
+        material_names: (0..materials.len() as u32).map(|i| materials.name(MaterialId(i))).collect(),
+        textures: n_textures,
+        images,
+        image_bytes,
+        lights: lights.len(),
+        area_lights,
+        infinite_lights: lights.environments().len(),
+        geometry_bytes: geometry.memory_bytes(),
     }
 }

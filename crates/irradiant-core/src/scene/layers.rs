@@ -61,7 +61,7 @@ impl LayerPlan {
             first_bucket: channels - n_buckets,
             layers,
             channels,
-            space_from_render: Affine::from(space),
+            space_from_render: Affine::from_transform(space).unwrap_or_default(),
             n_buckets,
             lambda_range,
             variance: matches!(film.kind, FilmKind::Gbuffer { .. }),
@@ -103,7 +103,7 @@ impl LayerPlan {
             return;
         }
         // Reflectance as the film would show it under white light.
-        let albedo = scene.film_rgb(bsdf.albedo(at.wo) * scene.white(lambda), lambda);
+        let albedo = scene.film_rgb(bsdf.rho_hd(at.wo, 16) * scene.white(lambda), lambda);
         let space = &self.space_from_render;
         let p = space.point(at.p);
         let slope = camera_ray.depth_slope(at, space);

@@ -14,14 +14,15 @@ pub use layers::LayerPlan;
 use crate::camera::{Camera, CameraRay, FootprintEstimator};
 use crate::film::filter::Filter;
 use crate::film::{Film, PixelBounds};
-use crate::geometry::{AlphaTest, Geometry};
+use crate::geometry::{AlphaTextures, Geometry};
 use crate::interaction::{Interaction, MaterialId, TextureContext};
-use crate::light::{LightSample, Lights};
+use crate::light::{LightSample, LightTarget, Lights};
 use crate::light_sampler::LightSampler;
 use crate::material::Materials;
 use crate::sampler::Sampler;
-use crate::texture::{FloatValue, Textures};
-use irradiant_math::{Point2, Transform};
+use crate::texture::Textures;
+use irradiant_scene::desc::FloatTextureRef;
+use irradiant_math::{Normal3, Point2, Transform, Vec3};
 use irradiant_spectrum::{Basis, ColorSpace, SampledSpectrum, Sensor, Spectrum, Wavelengths};
 
 /// Everything that a sample is a function of, but its pixel and index and the integrator.
@@ -68,10 +69,9 @@ pub struct Scene {
 /// Decides alpha tests with the scene's textures.
 pub struct SceneAlpha<'a>(&'a Textures);
 
-impl AlphaTest for SceneAlpha<'_> {
-    #[inline]
-    fn alpha(&self, value: FloatValue, at: &TextureContext) -> f32 {
-        self.0.float(value, at)
+impl AlphaTextures for SceneAlpha<'_> {
+    fn alpha(&self, texture: FloatTextureRef, at: &TextureContext) -> f32 {
+        self.0.float(self.0.float_value(texture), at)
     }
 }
 
@@ -142,8 +142,16 @@ impl Scene {
     /// True when something stands between a surface point and the end of a light sample.
     #[inline]
     pub fn is_occluded(&self, at: &Interaction, sample: &LightSample) -> bool {
-        let (ray, t_max) = at.shadow_ray(sample.wi, &sample.target);
-        self.geometry.occluded(&ray, t_max, &self.alpha())
+        match sample.target {
+            LightTarget::Infinite => self.geometry.occluded(&at.spawn_ray(sample.wi), f32::INFINITY, &self.alpha()),
+            LightTarget::Point(p) => {
+                let segment = at.spawn_ray_to(p, Vec3::ZERO, Normal3::ZERO);
+                self.geometry.occluded_between(&segment, &self.alpha())
+            }
+            LightTarget::Surface { p, p_error, n } => {
+                self.geometry.occluded_between(&at.spawn_ray_to(p, p_error, n), &self.alpha())
+            }
+        }
     }
 
     /// World from render space.

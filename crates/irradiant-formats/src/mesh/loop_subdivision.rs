@@ -363,6 +363,17 @@ mod tests {
         }
     }
 
+    /// By hand from Loop's masks with Warren's weights: 2/5 p + 1/5 of the ring's sum at valence 3, 1/2 p + 1/8 at 4.
+    #[test]
+    fn limit_positions_of_corners_are_those_of_the_masks() {
+        let t = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+        let m = subdivide(&t, &[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], 2).unwrap();
+        assert!(m.positions[0].iter().all(|c| (c - 0.2).abs() < 1e-6), "{:?}", m.positions[0]);
+        let (p, f) = octahedron();
+        let m = subdivide(&p, &f, 2).unwrap();
+        assert!((m.positions[0][0] - 0.5).abs() < 1e-6, "{:?}", m.positions[0]);
+    }
+
     #[test]
     fn normals_of_a_symmetric_body_point_along_its_axes_and_agree_with_the_faces() {
         let (p, f) = octahedron();
@@ -404,6 +415,24 @@ mod tests {
                 assert!(
                     (m.positions[3][0] - expected[0]).abs() < 1e-6 && (m.positions[3][1] - expected[1]).abs() < 1e-6
                 );
+            }
+        }
+    }
+
+    /// The weights of a tangent add up to 0, so moving the mesh turns no normal: a wrong weight turns those of
+    /// boundary vertices with five neighbours and more by far more than 1e-3.
+    #[test]
+    fn normals_do_not_depend_on_where_the_mesh_stands() {
+        let ring = [[1.0, 0.0, 0.3], [0.7, 0.7, -0.2], [0.0, 1.0, 0.5], [-0.7, 0.7, 0.1], [-1.0, 0.0, 0.4]];
+        let p: Vec<[f32; 3]> = std::iter::once([0.0; 3]).chain(ring).collect();
+        let f = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        let moved: Vec<[f32; 3]> = p.iter().map(|q| [q[0] + 8.0, q[1] - 16.0, q[2] + 32.0]).collect();
+        for levels in 0..3 {
+            let (a, b) = (subdivide(&p, &f, levels).unwrap(), subdivide(&moved, &f, levels).unwrap());
+            for (m, n) in a.normals.iter().zip(&b.normals) {
+                let length = |v: &[f32; 3]| v.iter().map(|c| c * c).sum::<f32>().sqrt();
+                let dot: f32 = (0..3).map(|i| m[i] * n[i]).sum();
+                assert!(dot > 0.99999 * length(m) * length(n), "{m:?} {n:?}");
             }
         }
     }

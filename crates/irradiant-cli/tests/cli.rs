@@ -1,0 +1,262 @@
+//! The program as a user drives it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// A folder of its own for each test, removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("irradiant-cli-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.0.join(name);
+        std::fs::write(&path, text).expect("writable");
+        path
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("the program starts")
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_irradiant"));
+        command.args(arguments).current_dir(&self.0).stdin(Stdio::null());
+        command
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(&self.0)
+            .expect("readable")
+            .map(|e| e.expect("readable").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap_or(-1)
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+const SMALL: [&str; 4] = ["--resolution", "24x24", "--spp", "2"];
+const SCENE: &str = "Film \"rgb\" \"integer xresolution\" 16 \"integer yresolution\" 12 \"string filename\" \"deep/ball.exr\"\nCamera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\nTranslate 0 0 3\nShape \"sphere\"\n";
+
+#[test]
+fn without_a_scene_the_cornell_box_is_rendered_beside_a_png() {
+    let folder = Folder::new("default");
+    let output = folder.run(&[&["render"], &SMALL[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert_eq!(folder.names(), ["cornell-box.exr", "cornell-box.png"]);
+    assert!(stderr(&output).contains("unbiased"), "{}", stderr(&output));
+}
+
+#[test]
+fn without_o_the_picture_has_the_films_name_in_this_directory() {
+    let folder = Folder::new("name");
+    folder.write("scene.pbrt", SCENE);
+    let output = folder.run(&["render", "scene.pbrt", "--quiet"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert_eq!(stderr(&output), "");
+    assert_eq!(folder.names(), ["ball.exr", "ball.png", "scene.pbrt"]);
+}
+
+#[test]
+fn a_scene_comes_from_standard_input_too() {
+    use std::io::Write;
+    let folder = Folder::new("stdin");
+    let mut child = folder.command(&["render", "-", "-o", "x.pfm", "-q"]).stdin(Stdio::piped()).spawn().expect("starts");
+    child.stdin.take().expect("piped").write_all(SCENE.as_bytes()).expect("writable");
+    assert!(child.wait().expect("ends").success());
+    assert_eq!(folder.names(), ["x.pfm"]);
+}
+
+#[test]
+fn equal_pixels_are_equal_files_for_any_number_of_threads() {
+    let folder = Folder::new("bytes");
+    for (threads, name) in [("1", "a.exr"), ("3", "b.exr")] {
+        let output = folder.run(&[&["render", "--threads", threads, "-o", name], &SMALL[..]].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+    }
+    let read = |name: &str| std::fs::read(folder.0.join(name)).expect("written");
+    assert_eq!(read("a.exr"), read("b.exr"));
+    folder.run(&[&["render", "--seed", "9", "-o", "c.exr"], &SMALL[..]].concat());
+    assert_ne!(read("a.exr"), read("c.exr"));
+}
+
+#[test]
+fn exit_codes_tell_who_can_fix_it() {
+    let folder = Folder::new("codes");
+    folder.write("broken.pbrt", "WorldBegin\nShape \"spere\"\n");
+    folder.write("mesh.pbrt", "WorldBegin\nLightSource \"infinite\"\nShape \"plymesh\" \"string filename\" \"gone.ply\"\n");
+    folder.write("ok.pbrt", SCENE);
+    for (arguments, expected, says) in [
+        (&["render", "missing.pbrt"][..], 66, "missing.pbrt"),
+        (&["render", "broken.pbrt"], 65, "did you mean \"sphere\"?"),
+        (&["check", "broken.pbrt"], 65, "broken.pbrt:2:7"),
+        (&["render", "mesh.pbrt"], 66, "gone.ply"),
+        (&["render", "ok.pbrt", "--max-dept", "3"], 2, "--max-depth"),
+        (&["render", "ok.pbrt", "--integrator", "pth"], 2, "did you mean"),
+        (&["render", "ok.pbrt", "-o", "x.gif"], 2, ".exr"),
+        (&["render", "ok.pbrt", "-o", "nowhere/x.exr"], 2, "nowhere"),
+        (&["render", "ok.pbrt", "--crop", "0,2,0,1"], 2, "crop"),
+        (&["probe", "ok.pbrt", "--pixel", "99,0"], 2, "columns 0 to 15"),
+        (&["compare", "gone.exr", "gone.exr"], 66, "gone.exr"),
+        (&["compare", "ok.pbrt", "ok.pbrt"], 65, "ok.pbrt"),
+        (&["frobnicate"], 2, "Usage"),
+    ] {
+        let output = folder.run(arguments);
+        assert_eq!(code(&output), expected, "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(says), "{arguments:?} should say {says}: {}", stderr(&output));
+    }
+    assert_eq!(folder.names(), ["broken.pbrt", "mesh.pbrt", "ok.pbrt"], "an error left files behind");
+}
+
+#[test]
+fn a_picture_that_was_there_survives_a_failed_render() {
+    let folder = Folder::new("survive");
+    folder.write("keep.exr", "precious");
+    folder.write("broken.pbrt", "WorldBegin\nShape \"spere\"\n");
+    folder.run(&["render", "broken.pbrt", "-o", "keep.exr"]);
+    assert_eq!(std::fs::read_to_string(folder.0.join("keep.exr")).expect("there"), "precious");
+}
+
+#[test]
+fn compare_measures_and_says_so_in_json() {
+    let folder = Folder::new("compare");
+    for (seed, name) in [("1", "a.exr"), ("2", "b.exr")] {
+        folder.run(&[&["render", "--seed", seed, "-o", name], &SMALL[..]].concat());
+    }
+    let same = folder.run(&["compare", "a.exr", "a.exr", "--json"]);
+    assert_eq!(code(&same), 0);
+    let value: serde_json::Value = serde_json::from_slice(&same.stdout).expect("JSON");
+    assert_eq!(value["mse"], 0.0);
+    assert_eq!(value["mean_ratio"], 1.0);
+    let other: serde_json::Value =
+        serde_json::from_slice(&folder.run(&["compare", "a.exr", "b.exr", "--json"]).stdout).expect("JSON");
+    assert!(other["relmse"].as_f64().is_some_and(|x| x > 0.0));
+    folder.run(&["render", "--resolution", "10x24", "--spp", "1", "-o", "c.exr"]);
+    assert_eq!(code(&folder.run(&["compare", "a.exr", "c.exr"])), 65);
+}
+
+#[test]
+fn stats_are_json_and_the_picture_does_not_know_of_them() {
+    let folder = Folder::new("stats");
+    folder.run(&[&["render", "-o", "a.exr", "--stats", "s.json"], &SMALL[..]].concat());
+    folder.run(&[&["render", "-o", "b.exr"], &SMALL[..]].concat());
+    let text = std::fs::read(folder.0.join("s.json")).expect("written");
+    let value: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+    assert_eq!(value["paths"], 24 * 24 * 2);
+    for key in ["phases", "rays", "mean_path_length", "cpu_seconds", "threads"] {
+        assert!(!value[key].is_null(), "{key} is missing");
+    }
+    let read = |name: &str| std::fs::read(folder.0.join(name)).expect("written");
+    assert_eq!(read("a.exr"), read("b.exr"));
+}
+
+#[test]
+fn probe_replays_a_sample() {
+    let folder = Folder::new("probe");
+    let output = folder.run(&["probe", "--pixel", "256,300", "--sample", "5"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let text = stdout(&output);
+    for word in ["wavelengths", "vertex 0", "material white", "radiance", "film"] {
+        assert!(text.contains(word), "{word} is missing in {text}");
+    }
+    assert_eq!(text, stdout(&folder.run(&["probe", "--pixel", "256,300", "--sample", "5"])));
+}
+
+#[test]
+fn check_tells_what_a_scene_holds() {
+    let folder = Folder::new("check");
+    folder.write("s.pbrt", SCENE);
+    let output = folder.run(&["check", "s.pbrt"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("16 x 12"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("truncated: maxdepth 5"), "{}", stdout(&output));
+}
+
+#[test]
+fn what_is_not_honoured_is_said_and_strict_makes_it_an_error() {
+    let folder = Folder::new("strict");
+    folder.write(
+        "fog.pbrt",
+        &SCENE.replace(
+            "WorldBegin\n",
+            "WorldBegin\nMakeNamedMedium \"fog\" \"string type\" \"homogeneous\"\nMediumInterface \"fog\" \"\"\n",
+        ),
+    );
+    let output = folder.run(&["render", "fog.pbrt"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stderr(&output).contains("warning"), "{}", stderr(&output));
+    assert_eq!(code(&folder.run(&["render", "fog.pbrt", "--strict"])), 65);
+}
+
+#[test]
+fn images_are_converted() {
+    let folder = Folder::new("image");
+    folder.run(&[&["render", "-o", "a.exr"], &SMALL[..]].concat());
+    for name in ["a.png", "a.pfm", "a.hdr", "a.qoi", "a.jpg"] {
+        let output = folder.run(&["image", "a.exr", "-o", name, "--exposure", "-1"]);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+    }
+    assert_eq!(folder.names().len(), 6);
+}
+
+#[test]
+fn a_time_limit_ends_a_long_render() {
+    let folder = Folder::new("time");
+    let output = folder.run(&["render", "--resolution", "64x64", "--spp", "1000000", "--time", "300ms", "-o", "x.exr"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(folder.0.join("x.exr").exists());
+}
+
+/// Waits for a render to be under way, interrupts it as Ctrl-C does.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_writes_the_picture_so_far() {
+    let folder = Folder::new("interrupt");
+    let mut child = folder
+        .command(&["render", "--resolution", "64x64", "--spp", "10000000", "-o", "x.exr"])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("starts");
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let kill = |signal: &str| Command::new("kill").args([signal, &child.id().to_string()]).status();
+    assert!(kill("-INT").expect("kill runs").success());
+    let status = child.wait().expect("ends");
+    assert!(status.success(), "{status}");
+    assert!(Path::new(&folder.0.join("x.exr")).exists());
+}
+
+#[test]
+fn versions_and_help_are_there() {
+    let folder = Folder::new("help");
+    assert!(stdout(&folder.run(&["--version"])).contains(env!("CARGO_PKG_VERSION")));
+    let help = stdout(&folder.run(&["render", "--help"]));
+    for flag in [
+        "--output", "--spp", "--time", "--seed", "--threads", "--resolution", "--crop", "--integrator", "--max-depth",
+        "--color", "--exposure", "--preview", "--stats", "--quiet", "--strict",
+    ] {
+        assert!(help.contains(flag), "{flag} is not documented");
+    }
+}
