@@ -6,13 +6,13 @@ use crate::interaction::ShapeId;
 use crate::sampler::Sampler;
 use irradiant_image::{FileFormat, Image, write};
 use irradiant_math::{Normal3, Point2, Point3, Transform, Vec3};
+use irradiant_scene::assets::MemoryAssets;
 use irradiant_scene::desc::material::{CoatDesc, ConductorDesc};
 use irradiant_scene::desc::texture::{BasicTexture, FloatTextureKind, TextureDesc};
 use irradiant_scene::desc::{
     ColorSpaceName, FileDesc, FloatParam, FloatTextureRef, MappingDesc, MaterialDesc, MaterialKind, MaterialRef,
     RoughnessDesc, SamplerKind, SceneDesc, SpannedFloat, SpannedSpectrum, SpectrumDesc, SpectrumParam,
 };
-use irradiant_scene::assets::MemoryAssets;
 use irradiant_scene::{Diagnostics, Span, Spanned};
 use irradiant_spectrum::{ColorSpace, RgbAlbedo, named};
 
@@ -198,17 +198,14 @@ fn only_varying_indices_end_wavelengths() {
     let glass = || of(SpectrumDesc::Named("glass-BK7".into()));
     let even = of(SpectrumDesc::Samples([(300.0, 1.4), (900.0, 1.4)].as_slice().into()));
     let dispersive_coat = CoatDesc { eta: glass(), ..coat(0.0) };
-    let cases = vec![
+    let cases = [
         (MaterialKind::Dielectric { eta: grey(1.5), roughness: rough(0.0) }, false),
         (MaterialKind::Dielectric { eta: even, roughness: rough(0.0) }, false),
         (MaterialKind::Dielectric { eta: glass(), roughness: rough(0.1) }, true),
         (MaterialKind::ThinDielectric { eta: glass() }, true),
         (MaterialKind::CoatedDiffuse { reflectance: grey(0.5), coat: dispersive_coat.clone() }, true),
         (MaterialKind::CoatedDiffuse { reflectance: grey(0.5), coat: coat(0.0) }, false),
-        (
-            MaterialKind::CoatedConductor { fresnel: metal("Cu"), roughness: rough(0.0), coat: dispersive_coat },
-            true,
-        ),
+        (MaterialKind::CoatedConductor { fresnel: metal("Cu"), roughness: rough(0.0), coat: dispersive_coat }, true),
         (MaterialKind::Conductor { fresnel: metal("Cu"), roughness: rough(0.0) }, false),
     ];
     let desc = scene(cases.iter().map(|(k, _)| k.clone()).collect());
@@ -316,8 +313,7 @@ fn normal_maps_turn_the_normal_in_its_frame() {
     });
     let assets = MemoryAssets::default().with("n.exr", write(&image, FileFormat::Exr).unwrap());
     let mut desc = scene(vec![MaterialKind::Diffuse { reflectance: grey(0.5) }]);
-    desc.materials[0].normal_map =
-        Some(Spanned::unplaced(FileDesc { name: "n.exr".into(), path: "n.exr".into() }));
+    desc.materials[0].normal_map = Some(Spanned::unplaced(FileDesc { name: "n.exr".into(), path: "n.exr".into() }));
     let (t, m, d) = compile_with(&desc, &assets);
     assert!(d.is_empty(), "{d:?}");
     let mut at = flat();
@@ -357,11 +353,7 @@ fn all_kinds() -> Vec<MaterialKind> {
             roughness: rough(0.1),
             coat: fog,
         },
-        MaterialKind::Subsurface {
-            mean_albedo: grey(0.8),
-            eta: Spanned::unplaced(1.33),
-            roughness: rough(0.0),
-        },
+        MaterialKind::Subsurface { mean_albedo: grey(0.8), eta: Spanned::unplaced(1.33), roughness: rough(0.0) },
         MaterialKind::Hair { mean_albedo: grey(0.3) },
         MaterialKind::Measured { file: Spanned::unplaced(FileDesc { name: "b".into(), path: "b".into() }) },
         MaterialKind::Retroreflective { reflectance: grey(0.6), base: grey(1.0), roughness: rough(0.1) },

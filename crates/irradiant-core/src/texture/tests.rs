@@ -3,6 +3,7 @@
 use super::*;
 use irradiant_image::{Chromaticities, Encoding, FileFormat, Image, write};
 use irradiant_math::{Normal3, Point2, Point3};
+use irradiant_scene::assets::MemoryAssets;
 use irradiant_scene::desc::texture::{
     BasicTexture, EncodingDesc, FloatTextureKind, ImageFilter, ImageMapDesc, ImageWrap, SpectrumTextureKind,
     TextureDesc,
@@ -11,7 +12,6 @@ use irradiant_scene::desc::{
     ColorSpaceName, FileDesc, MappingDesc, SceneDesc, SpannedFloat, SpannedSpectrum, SpectrumDesc, SpectrumParam,
     SpectrumTextureRef,
 };
-use irradiant_scene::assets::MemoryAssets;
 use irradiant_scene::{Diagnostics, Span, Spanned};
 use irradiant_spectrum::{RgbAlbedo, RgbUnbounded};
 
@@ -78,8 +78,7 @@ fn basics(kinds: Vec<BasicTexture<SpannedFloat>>) -> SceneDesc {
 
 fn compile_with(desc: &SceneDesc, assets: &MemoryAssets) -> (Textures, Diagnostics) {
     let mut diagnostics = Diagnostics::default();
-    let textures =
-        Textures::compile(desc, &Transform::IDENTITY, assets, ColorSpace::srgb(), &mut diagnostics);
+    let textures = Textures::compile(desc, &Transform::IDENTITY, assets, ColorSpace::srgb(), &mut diagnostics);
     (textures, diagnostics)
 }
 
@@ -128,8 +127,18 @@ fn numbers_combine_by_their_formulas() {
         BasicTexture::Scale { tex: float_ref(0), scale: value(3.0) },
         BasicTexture::Mix { tex1: float_ref(0), tex2: value(2.0), amount: float_ref(0) },
         BasicTexture::DirectionMix { tex1: value(5.0), tex2: float_ref(0), dir: [0.0, 0.0, 1.0] },
-        BasicTexture::Checkerboard { tex1: value(7.0), tex2: float_ref(0), dimension: 2, mapping: MappingDesc::default() },
-        BasicTexture::Checkerboard { tex1: value(7.0), tex2: value(8.0), dimension: 3, mapping: MappingDesc::default() },
+        BasicTexture::Checkerboard {
+            tex1: value(7.0),
+            tex2: float_ref(0),
+            dimension: 2,
+            mapping: MappingDesc::default(),
+        },
+        BasicTexture::Checkerboard {
+            tex1: value(7.0),
+            tex2: value(8.0),
+            dimension: 3,
+            mapping: MappingDesc::default(),
+        },
         BasicTexture::Dots { inside: value(1.0), outside: value(0.0), mapping: MappingDesc::default() },
         BasicTexture::Scale { tex: value(2.0), scale: float_ref(0) },
     ]);
@@ -242,7 +251,8 @@ fn images_are_their_pixels() {
 
 #[test]
 fn encodings_are_honoured() {
-    let with = |encoding| BasicTexture::ImageMap(ImageMapDesc { encoding, ..image_map("grey.png", ImageFilter::Point) });
+    let with =
+        |encoding| BasicTexture::ImageMap(ImageMapDesc { encoding, ..image_map("grey.png", ImageFilter::Point) });
     let desc = basics(vec![with(EncodingDesc::Linear), with(EncodingDesc::Srgb), with(EncodingDesc::Gamma(2.0))]);
     let (t, diagnostics) = compile_with(&desc, &grey_png());
     assert!(diagnostics.is_empty() && t.counts().1 == 3);
@@ -293,10 +303,7 @@ fn the_images_own_colour_space_is_taken() {
     });
     let assets = MemoryAssets::default().with("wide.exr", write(&image, FileFormat::Exr).unwrap());
     let map = BasicTexture::ImageMap(image_map("wide.exr", ImageFilter::Bilinear));
-    let desc = SceneDesc {
-        spectrum_textures: vec![texture(SpectrumTextureKind::Basic(map))],
-        ..SceneDesc::default()
-    };
+    let desc = SceneDesc { spectrum_textures: vec![texture(SpectrumTextureKind::Basic(map))], ..SceneDesc::default() };
     let (mut t, diagnostics) = compile_with(&desc, &assets);
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     let id = spectrum(&mut t, &desc, 0, Role::Reflectance);
@@ -312,8 +319,12 @@ fn the_images_own_colour_space_is_taken() {
 
 #[test]
 fn footprints_blur_unless_switched_off() {
-    let board =
-        || BasicTexture::Checkerboard { tex1: value(0.0), tex2: value(1.0), dimension: 2, mapping: MappingDesc::default() };
+    let board = || BasicTexture::Checkerboard {
+        tex1: value(0.0),
+        tex2: value(1.0),
+        dimension: 2,
+        mapping: MappingDesc::default(),
+    };
     let image = || BasicTexture::ImageMap(image_map("grey.png", ImageFilter::Trilinear));
     let mut desc = basics(vec![board(), image()]);
     let wide = TextureContext { dudx: 40.0, dvdy: 40.0, ..at(0.9, 0.9) };
@@ -342,11 +353,16 @@ fn means_of_combinations() {
     let desc = basics(vec![
         ramp(),
         BasicTexture::Mix { tex1: float_ref(0), tex2: value(1.0), amount: value(0.25) },
-        BasicTexture::Checkerboard { tex1: float_ref(0), tex2: value(1.0), dimension: 2, mapping: MappingDesc::default() },
+        BasicTexture::Checkerboard {
+            tex1: float_ref(0),
+            tex2: value(1.0),
+            dimension: 2,
+            mapping: MappingDesc::default(),
+        },
         BasicTexture::Dots { inside: value(1.0), outside: value(0.0), mapping: MappingDesc::default() },
     ]);
     let t = compile(&desc);
-    for (i, expected) in [0.4, 0.55, 0.7, 0.1924].into_iter().enumerate() {
+    for (i, expected) in [0.4, 0.55, 0.7, procedural::DOT_SHARE].into_iter().enumerate() {
         assert!((t.mean_float(t.float_value(FloatTextureRef(i as u32))) - expected).abs() < 1e-6);
     }
 }
