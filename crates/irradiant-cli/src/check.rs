@@ -69,6 +69,10 @@ pub fn run(arguments: &CheckArguments) -> Exit {
 }
 
 fn explain(code: &str) -> Exit {
+    if let Some(text) = irradiant::core::codes::explain(code) {
+        println!("{}: {text}", code.to_ascii_uppercase());
+        return Exit::Ok;
+    }
     match irradiant::formats::pbrt::codes::explain(code) {
         Some(entry) => {
             println!("{}: {}\n\nFor example:\n\n{}", entry.code, entry.explanation, entry.example);

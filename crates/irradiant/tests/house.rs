@@ -295,6 +295,29 @@ fn files_are_of_a_size_to_read() {
     assert_none("which second noun has moved in?", long.collect());
 }
 
+/// Codes of diagnostics in the code of a crate, its table of explanations left out.
+fn codes(krate: &str) -> BTreeSet<String> {
+    let is_code = |word: &&str| {
+        word.len() == 5 && word.starts_with(['E', 'W', 'N']) && word[1..].bytes().all(|b| b.is_ascii_digit())
+    };
+    let sources = files(&format!("crates/{krate}/src"), ".rs").into_iter().filter(|f| !f.ends_with("codes.rs"));
+    let lines = sources.flat_map(|f| code_of(&f));
+    lines.flat_map(|(_, l)| l.split('"').filter(is_code).map(String::from).collect::<Vec<_>>()).collect()
+}
+
+#[test]
+fn every_code_means_one_thing_and_is_explained() {
+    let (reading, compiling) = (codes("irradiant-formats"), codes("irradiant-core"));
+    assert!(reading.len() > 50 && compiling.len() > 50, "the codes were not understood");
+    let mut wrong: Vec<String> = reading.intersection(&compiling).map(|c| format!("{c} means two things")).collect();
+    for (krate, used) in [("irradiant-formats/src/pbrt", &reading), ("irradiant-core/src", &compiling)] {
+        let table = text(&root().join(format!("crates/{krate}/codes.rs")));
+        let unexplained = used.iter().filter(|c| !table.contains(&format!("\"{c}\"")));
+        wrong.extend(unexplained.map(|c| format!("{c} is not in crates/{krate}/codes.rs")));
+    }
+    assert_none("codes of diagnostics", wrong);
+}
+
 #[test]
 fn nothing_is_left_for_later() {
     // Written in two halves, or this file would find itself.

@@ -95,7 +95,7 @@ fn search(lens: &Lens, r: f64, window: [f64; 4], steps: usize, known: Option<[f6
                 continue;
             }
             let ray = LensRay { o: [r, 0.0, 0.0], d: [x - r, y, z] };
-            if lens.from_film(ray).is_some() {
+            if lens.trace_to_scene(ray).is_some() {
                 let point = [x, x, -y.abs(), y.abs()];
                 found = Some(found.map_or(point, |b| union(b, point)));
             }

@@ -84,7 +84,7 @@ impl FootprintEstimator {
         };
         let seen = at.p - origin;
         let distance = seen.length();
-        let frame = Frame::from_z(seen / distance);
+        let frame = Frame::from_z(seen * (1.0 / distance));
         let n = frame.to_local(at.n.as_vec());
         // The tangent plane in that frame is n . q = n.z distance.
         std::array::from_fn(|axis| {

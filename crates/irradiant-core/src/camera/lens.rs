@@ -4,7 +4,6 @@
 //! z = 0, the scene at +z. In `f64`: focusing and finite differences along the film subtract nearly equal numbers.
 
 use super::aperture::Mask;
-use irradiant_math::solve::quadratic;
 
 /// A ray in the camera's space, metres.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +13,7 @@ pub(super) struct LensRay {
 }
 
 impl LensRay {
-    fn at(&self, t: f64) -> [f64; 3] {
+    pub fn at(&self, t: f64) -> [f64; 3] {
         std::array::from_fn(|i| self.o[i] + self.d[i] * t)
     }
 }
@@ -70,9 +69,9 @@ impl Lens {
         self.elements.iter().map(|e| e.thickness).sum()
     }
 
-    /// The ray as it leaves the lens towards the scene, with the mask's transmittance; `None` when it is blocked.
-    pub fn from_film(&self, ray: LensRay) -> Option<(LensRay, f64)> {
-        let (mut ray, mut z, mut weight) = (ray, 0.0, 1.0);
+    /// The ray as it leaves the lens towards the scene, its direction unit, with the mask's transmittance; `None` when it is blocked.
+    pub fn trace_to_scene(&self, ray: LensRay) -> Option<(LensRay, f64)> {
+        let (mut ray, mut z, mut weight) = (LensRay { d: normalize(ray.d), ..ray }, 0.0, 1.0);
         for (i, element) in self.elements.iter().enumerate().rev() {
             z += element.thickness;
             let hit = meet(element, z, &ray)?;
@@ -93,8 +92,8 @@ impl Lens {
     }
 
     /// The ray as it leaves the lens towards the film; `None` when it is blocked. The mask is not looked at.
-    pub fn from_scene(&self, ray: LensRay) -> Option<LensRay> {
-        let (mut ray, mut z, mut before) = (ray, self.front_z(), 1.0);
+    pub fn trace_to_film(&self, ray: LensRay) -> Option<LensRay> {
+        let (mut ray, mut z, mut before) = (LensRay { d: normalize(ray.d), ..ray }, self.front_z(), 1.0);
         for element in &self.elements {
             let hit = meet(element, z, &ray)?;
             let p = ray.at(hit.t);
@@ -113,23 +112,28 @@ struct SurfaceHit {
     normal: Option<[f64; 3]>,
 }
 
-/// Where a ray meets a surface whose vertex is at `z`.
+/// Where a ray of unit direction meets a surface whose vertex is at `z`.
+#[inline]
 fn meet(element: &Element, z: f64, ray: &LensRay) -> Option<SurfaceHit> {
     if element.is_stop() {
         let t = (z - ray.o[2]) / ray.d[2];
         return (t >= 0.0).then_some(SurfaceHit { t, normal: None });
     }
-    let o = [ray.o[0], ray.o[1], ray.o[2] - (z - element.radius)];
-    let (t0, t1) = quadratic(dot(ray.d, ray.d), 2.0 * dot(ray.d, o), dot(o, o) - element.radius * element.radius)?;
+    let radius = element.radius;
+    let o = [ray.o[0], ray.o[1], ray.o[2] - (z - radius)];
+    let b = dot(ray.d, o);
+    let discriminant = b * b - (dot(o, o) - radius * radius);
+    if !(discriminant >= 0.0) {
+        return None;
+    }
     // The surface is the cap around the vertex: the near half of the sphere for a ray that comes from outside of it.
-    let t = if (ray.d[2] < 0.0) != (element.radius < 0.0) { t0 } else { t1 };
+    let enters = (ray.d[2] < 0.0) != (radius < 0.0);
+    let t = if enters { -b - discriminant.sqrt() } else { -b + discriminant.sqrt() };
     if !(t >= 0.0) {
         return None;
     }
-    let p = std::array::from_fn(|i| o[i] + ray.d[i] * t);
-    let n = normalize(p);
-    let normal = if dot(n, ray.d) > 0.0 { n.map(|c| -c) } else { n };
-    Some(SurfaceHit { t, normal: Some(normal) })
+    let scale = if enters { 1.0 } else { -1.0 } / radius.abs();
+    Some(SurfaceHit { t, normal: Some(std::array::from_fn(|i| (o[i] + ray.d[i] * t) * scale)) })
 }
 
 /// Nothing when a point lies outside of the opening.
@@ -137,10 +141,9 @@ fn within(element: &Element, p: [f64; 3]) -> Option<()> {
     (p[0] * p[0] + p[1] * p[1] <= element.opening * element.opening).then_some(())
 }
 
-/// A direction behind a surface (Snell), unit; unchanged at the stop, `None` under total reflection.
+/// A unit direction behind a surface (Snell), unit but for rounding; unchanged at the stop, `None` under total reflection.
 fn refracted(d: [f64; 3], normal: Option<[f64; 3]>, eta_from: f64, eta_to: f64) -> Option<[f64; 3]> {
     let Some(n) = normal else { return Some(d) };
-    let d = normalize(d);
     let ratio = eta_from / eta_to;
     let cos_from = -dot(d, n);
     let sin2_to = (1.0 - cos_from * cos_from).max(0.0) * ratio * ratio;
@@ -172,8 +175,8 @@ impl ThickLens {
         };
         let from_scene = LensRay { o: [height, 0.0, lens.front_z() + 1.0], d: [0.0, 0.0, -1.0] };
         let from_film = LensRay { o: [height, 0.0, lens.rear_z() - 1.0], d: [0.0, 0.0, 1.0] };
-        let (film_principal, film_focus) = cardinal(lens.from_scene(from_scene)?);
-        let (scene_principal, scene_focus) = cardinal(lens.from_film(from_film)?.0);
+        let (film_principal, film_focus) = cardinal(lens.trace_to_film(from_scene)?);
+        let (scene_principal, scene_focus) = cardinal(lens.trace_to_scene(from_film)?.0);
         [film_principal, film_focus, scene_principal, scene_focus].iter().all(|z| z.is_finite()).then_some(Self {
             film_principal,
             film_focus,

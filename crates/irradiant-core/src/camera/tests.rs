@@ -32,7 +32,7 @@ fn orthographic(window: [f32; 4], lens_radius: f32, focal_distance: f32) -> Came
 }
 
 /// Tronnier's double Gauss, US patent 2,673,491, scaled to a focal length of 50 mm; f/2, half field of view 22 degrees.
-const DOUBLE_GAUSS: [[f32; 4]; 11] = [
+pub(super) const DOUBLE_GAUSS: [[f32; 4]; 11] = [
     [29.475, 3.76, 1.67, 25.2],
     [84.83, 0.12, 1.0, 25.2],
     [19.275, 4.025, 1.67, 23.0],
@@ -46,7 +46,7 @@ const DOUBLE_GAUSS: [[f32; 4]; 11] = [
     [-39.73, 5.0, 1.0, 20.0],
 ];
 
-fn realistic(aperture_diameter: f32, focus_distance: f32, aperture: ApertureShape) -> CameraKind {
+pub(super) fn realistic(aperture_diameter: f32, focus_distance: f32, aperture: ApertureShape) -> CameraKind {
     CameraKind::Realistic {
         lens_file: None,
         lens: DOUBLE_GAUSS.as_slice().into(),
@@ -56,18 +56,26 @@ fn realistic(aperture_diameter: f32, focus_distance: f32, aperture: ApertureShap
     }
 }
 
-struct Setup {
+pub(super) struct Setup {
     kind: CameraKind,
     resolution: [u32; 2],
     camera_from_world: MotionDesc,
     samples: u32,
     space: RenderSpace,
+    pub assets: MemoryAssets,
 }
 
 impl Setup {
-    fn new(kind: CameraKind, resolution: [u32; 2]) -> Self {
+    pub fn new(kind: CameraKind, resolution: [u32; 2]) -> Self {
         let space = RenderSpace::CameraWorld;
-        Self { kind, resolution, camera_from_world: MotionDesc::default(), samples: 1, space }
+        Self {
+            kind,
+            resolution,
+            camera_from_world: MotionDesc::default(),
+            samples: 1,
+            space,
+            assets: MemoryAssets::default(),
+        }
     }
 
     fn try_compile(&self) -> (Option<CompiledCamera>, Vec<&'static str>) {
@@ -75,12 +83,11 @@ impl Setup {
             CameraDesc { kind: self.kind.clone(), camera_from_world: self.camera_from_world, ..CameraDesc::default() };
         let film = FilmDesc { resolution: spanned(self.resolution), ..FilmDesc::default() };
         let mut diagnostics = Diagnostics::default();
-        let assets = MemoryAssets::default();
-        let compiled = compile(&desc, &film, self.samples, self.space, &assets, &mut diagnostics);
+        let compiled = compile(&desc, &film, self.samples, self.space, &self.assets, &mut diagnostics);
         (compiled, diagnostics.iter().map(|d| d.code).collect())
     }
 
-    fn compile(&self) -> CompiledCamera {
+    pub fn compile(&self) -> CompiledCamera {
         let (compiled, codes) = self.try_compile();
         compiled.unwrap_or_else(|| panic!("{codes:?}"))
     }

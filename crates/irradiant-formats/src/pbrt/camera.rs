@@ -79,7 +79,7 @@ fn lens(r: &Reader, file: &Spanned<String>) -> Option<Arc<[[f32; 4]]>> {
     let bytes = r.bytes("lens file", file, &r.resolve(file), file.span)?;
     let complain = |message: String| {
         r.push(
-            Diagnostic::error("E0507", format!("lens file \"{}\": {message}", file.value), file.span)
+            Diagnostic::error("E1007", format!("lens file \"{}\": {message}", file.value), file.span)
                 .help("each line: curvature radius, thickness, index of refraction, aperture diameter (mm)"),
         );
     };

@@ -170,50 +170,50 @@ pub const CODES: &[Code] = &[
     code("E0405", "No object of this name.", "WorldBegin ObjectInstance \"tree\""),
     code("E0406", "No medium of this name.", "WorldBegin MediumInterface \"fog\" \"\" Shape \"sphere\""),
     code(
-        "E0501",
+        "E1001",
         "A file that the scene names does not exist. Names are relative to the folder of the scene's main file.",
         "WorldBegin Shape \"plymesh\" \"string filename\" \"no-such.ply\"",
     ),
-    code("E0502", "A file cannot be read, is not a whole gzip file, or is too large.", "Include \"/\""),
+    code("E1002", "A file cannot be read, is not a whole gzip file, or is too large.", "Include \"/\""),
     code(
-        "E0503",
+        "E1003",
         "A mesh file is damaged or holds no mesh.",
         "WorldBegin Shape \"plymesh\" \"string filename\" \"not-a.ply\"",
     ),
     code(
-        "E0504",
+        "E1004",
         "A face names a vertex that does not exist. Indices count from 0.",
         "WorldBegin Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [1 2 3]",
     ),
     code(
-        "E0505",
+        "E1005",
         "Lists of a mesh or curve do not fit together: one uv and one N for each P, three indices for each triangle.",
         "WorldBegin Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1]",
     ),
     code(
-        "E0506",
+        "E1006",
         "A mesh cannot be subdivided: at most two faces may meet at an edge, wound alike.",
         "WorldBegin Shape \"loopsubdiv\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 1]",
     ),
     code(
-        "E0507",
+        "E1007",
         "A lens file is lines of four numbers: curvature radius, thickness, index of refraction, aperture diameter (mm).",
         "Camera \"realistic\" \"string lensfile\" \"wrong.dat\"",
     ),
     code(
-        "E0508",
+        "E1008",
         "A curve of this degree cannot have this number of control points.",
         "WorldBegin Shape \"curve\" \"point3 P\" [0 0 0 1 0 0]",
     ),
     code(
-        "E0509",
+        "E1009",
         "A subdivided mesh would be too large.",
         "WorldBegin Shape \"loopsubdiv\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"integer levels\" 30",
     ),
-    code("E0601", "A directive of pbrt-v3.", "WorldBegin WorldEnd"),
-    code("E0602", "A name of pbrt-v3.", "WorldBegin Material \"matte\""),
+    code("E1101", "A directive of pbrt-v3.", "WorldBegin WorldEnd"),
+    code("E1102", "A name of pbrt-v3.", "WorldBegin Material \"matte\""),
     code(
-        "E0603",
+        "E1103",
         "A parameter type or form of pbrt-v3.",
         "WorldBegin Material \"diffuse\" \"color reflectance\" [1 1 1]",
     ),
@@ -353,7 +353,7 @@ mod tests {
                 .with("paper.bsdf", &b""[..])
                 .with("a.ptx", &b""[..])
                 .with("a.ply", crate::mesh::ply::tests::TRIANGLE.as_bytes());
-            if c.code == "E0502" {
+            if c.code == "E1002" {
                 continue;
             }
             let parsed = crate::read_pbrt("example", c.example.as_bytes().into(), &assets);

@@ -51,7 +51,7 @@ pub(crate) fn unknown_name(
 ) {
     match NAMES.iter().find(|(k, n, _)| *k == kind && *n == name.value) {
         Some((_, _, help)) => {
-            r.v3("E0602", format!("{kind} \"{}\" is pbrt-v3's", name.value), name.span, *help);
+            r.v3("E1102", format!("{kind} \"{}\" is pbrt-v3's", name.value), name.span, *help);
         }
         None => r.unknown(code, kind, name, known),
     }
@@ -105,7 +105,7 @@ pub(crate) fn parameter_type(name: &str) -> Option<&'static str> {
 /// Reports texture classes that are pbrt-v3's.
 pub(crate) fn texture_class(r: &Reader, class: &Spanned<String>) {
     if class.value == "color" {
-        r.v3("E0602", "texture class \"color\" is pbrt-v3's", class.span, "use \"spectrum\"");
+        r.v3("E1102", "texture class \"color\" is pbrt-v3's", class.span, "use \"spectrum\"");
     } else {
         r.unknown("E0212", "texture class", class, &["float", "spectrum"]);
     }
@@ -113,5 +113,5 @@ pub(crate) fn texture_class(r: &Reader, class: &Spanned<String>) {
 
 /// Reports a deprecated directive.
 pub(crate) fn unknown_directive(r: &Reader, help: &str, span: Span) {
-    r.v3("E0601", "this directive is pbrt-v3's", span, help);
+    r.v3("E1101", "this directive is pbrt-v3's", span, help);
 }

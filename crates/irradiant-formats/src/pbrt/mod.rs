@@ -75,7 +75,7 @@ pub fn read_pbrt_with(main: &str, text: Arc<[u8]>, assets: &dyn Assets, limits: 
         Err(error) => {
             let file = reader.add_source(main, Arc::from([]));
             let span = irradiant_scene::Span { file, start: 0, end: 0 };
-            reader.error("E0502", format!("the scene {error}"), span);
+            reader.error("E1002", format!("the scene {error}"), span);
         }
     }
     let desc = finish(parser);

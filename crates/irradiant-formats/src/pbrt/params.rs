@@ -391,7 +391,7 @@ impl Params {
             (Type::Blackbody, Values::Floats(v)) => {
                 if v.len() == 2 {
                     r.v3(
-                        "E0603",
+                        "E1103",
                         "\"blackbody\" with two values is pbrt-v3's",
                         p.value_span,
                         "give the temperature alone, and the factor as \"float scale\"",

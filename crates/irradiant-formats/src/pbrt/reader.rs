@@ -130,9 +130,9 @@ impl<'a> Reader<'a> {
     fn file_error(&self, what: &str, name: &str, path: &Path, span: Span, error: &AssetError) {
         let diagnostic = match error {
             AssetError::NotFound => {
-                Diagnostic::error("E0501", format!("{what} \"{name}\" does not exist"), span).missing()
+                Diagnostic::error("E1001", format!("{what} \"{name}\" does not exist"), span).missing()
             }
-            _ => Diagnostic::error("E0502", format!("{what} \"{name}\": {error}"), span),
+            _ => Diagnostic::error("E1002", format!("{what} \"{name}\": {error}"), span),
         };
         let help = format!("tried {}; names are relative to the folder of the scene's main file", path.display());
         self.push(diagnostic.help(help));

@@ -63,13 +63,13 @@ pub(crate) fn shape(r: &Reader, name: &Spanned<String>, p: &Params) -> Option<Sh
 fn indices<const N: usize>(r: &Reader, list: Spanned<&[i32]>, n_vertices: usize) -> Option<Vec<[u32; N]>> {
     if !list.value.len().is_multiple_of(N) {
         let message = format!("{} indices, which is not a multiple of {N}", list.value.len());
-        r.error("E0505", message, list.span);
+        r.error("E1005", message, list.span);
         return None;
     }
     let limit = n_vertices.min(i32::MAX as usize) as i32;
     if let Some((at, bad)) = list.value.iter().enumerate().find(|(_, i)| !(0..limit).contains(i)) {
         r.push(
-            Diagnostic::error("E0504", format!("vertex index {bad} (at position {at}) does not exist"), list.span)
+            Diagnostic::error("E1004", format!("vertex index {bad} (at position {at}) does not exist"), list.span)
                 .help(format!("there are {n_vertices} vertices, 0 to {}", n_vertices.saturating_sub(1))),
         );
         return None;
@@ -84,7 +84,7 @@ fn matching<T>(r: &Reader, name: &str, list: Option<Spanned<Vec<T>>>, n: usize, 
         Some(list) if list.value.len() == n => Some(list.value),
         Some(list) => {
             let message = format!("{} of \"{name}\" for {n} {of}", list.value.len());
-            r.error("E0505", message, list.span);
+            r.error("E1005", message, list.span);
             None
         }
     }
@@ -176,11 +176,11 @@ fn subdivided(r: &Reader, p: &Params) -> Option<MeshData> {
     if total.is_none_or(|n| n > max) {
         let span = if levels.span == Span::NONE { p.span } else { levels.span };
         let message = format!("{} levels of subdivision make more than {max} triangles", levels.value);
-        r.error_help("E0509", message, span, "each level makes four of one; 2 to 4 are usual");
+        r.error_help("E1009", message, span, "each level makes four of one; 2 to 4 are usual");
         return None;
     }
     loop_subdivision::subdivide(&positions.value, &faces, levels.value as u32)
-        .map_err(|e| r.error_help("E0506", e.to_string(), list.span, "no more than two faces may meet at an edge"))
+        .map_err(|e| r.error_help("E1006", e.to_string(), list.span, "no more than two faces may meet at an edge"))
         .ok()
 }
 
@@ -212,7 +212,7 @@ fn ply_mesh(r: &Reader, p: &Params) -> Option<Arc<MeshData>> {
         }
         Err(error) => {
             let help = format!("read from {}", path.display());
-            r.error_help("E0503", format!("mesh \"{}\": {error}", name.value), name.span, help);
+            r.error_help("E1003", format!("mesh \"{}\": {error}", name.value), name.span, help);
             None
         }
     });
@@ -240,7 +240,7 @@ fn curve_data(r: &Reader, p: &Params) -> Option<ShapeKind> {
     let segments = match curve::segments(&points.value, basis, degree) {
         Ok(segments) => segments,
         Err(message) => {
-            r.error("E0508", message, points.span);
+            r.error("E1008", message, points.span);
             return None;
         }
     };
@@ -248,7 +248,7 @@ fn curve_data(r: &Reader, p: &Params) -> Option<ShapeKind> {
         (CurveStyle::Ribbon, Some(n)) if n.value.len() == segments.len() + 1 => n.value,
         (CurveStyle::Ribbon, Some(n)) => {
             let message = format!("{} normals for {} segments", n.value.len(), segments.len());
-            r.error_help("E0505", message, n.span, "a ribbon has one normal more than segments");
+            r.error_help("E1005", message, n.span, "a ribbon has one normal more than segments");
             return None;
         }
         (CurveStyle::Ribbon, None) => {

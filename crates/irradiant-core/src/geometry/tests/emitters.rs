@@ -282,6 +282,27 @@ fn solid_angle_sampling_has_no_variance() {
     }
 }
 
+/// Directions to a sphere are uniform in height within its cone, near and far: each draw is where its number says.
+#[test]
+fn draws_of_a_sphere_fill_its_cone_evenly() {
+    let mut rng = Rng::new(7);
+    for distance in [1.01f32, 1.5, 10.0, 80.0] {
+        let g = compile(vec![emissive(shape(ball(1.0), Transform::translate(0.0, 0.0, distance as f64)))]);
+        let e = &g.emitters()[0].geometry;
+        let sin2 = 1.0 / (distance as f64 * distance as f64);
+        let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
+        for _ in 0..2000 {
+            let u = uniform(&mut rng);
+            let s = e.sample(&at([0.0; 3], None), u).unwrap();
+            let [x, y, z] = s.p.to_array().map(f64::from);
+            // 1 - cos = sin^2 / (1 + cos), without cancellation.
+            let cos = z / (x * x + y * y + z * z).sqrt();
+            let drawn = (x * x + y * y) / (x * x + y * y + z * z) / (1.0 + cos);
+            assert!((drawn / height - u.x as f64).abs() < 1e-4, "{distance} {u:?} {}", drawn / height);
+        }
+    }
+}
+
 /// From on the surface, in its plane, or where nothing can be drawn, nothing is drawn that is not sound.
 #[test]
 fn hostile_views_draw_sound_samples_or_none() {

@@ -159,7 +159,7 @@ impl<'r, 'a> Parser<'r, 'a> {
     pub fn run(&mut self, name: &str, text: Arc<[u8]>) {
         let file = self.r.add_source(name, text.clone());
         if text.len() > u32::MAX as usize {
-            self.r.error("E0502", "scene texts are limited to 4 GiB", Span { file, start: 0, end: 0 });
+            self.r.error("E1002", "scene texts are limited to 4 GiB", Span { file, start: 0, end: 0 });
             return;
         }
         self.bytes_left = self.bytes_left.saturating_sub(text.len() as u64);

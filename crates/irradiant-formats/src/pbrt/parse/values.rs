@@ -168,7 +168,7 @@ impl Parser<'_, '_> {
             return Some(t);
         }
         if let Some(help) = legacy::parameter_type(name) {
-            self.r.v3("E0603", format!("parameter type \"{name}\" is pbrt-v3's"), span, help);
+            self.r.v3("E1103", format!("parameter type \"{name}\" is pbrt-v3's"), span, help);
             return None;
         }
         let names: Vec<&str> = Type::NAMES.iter().map(|(n, _)| *n).collect();

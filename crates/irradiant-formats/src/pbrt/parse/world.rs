@@ -248,7 +248,7 @@ impl Parser<'_, '_> {
             let text = self.r.bytes("included file", &name.value, &path, name.span).filter(|t| {
                 let fits = t.len() <= u32::MAX as usize;
                 if !fits {
-                    self.r.error("E0502", "scene texts are limited to 4 GiB", name.span);
+                    self.r.error("E1002", "scene texts are limited to 4 GiB", name.span);
                 }
                 fits
             });
