@@ -1,7 +1,7 @@
 //! From the description to materials: ranges checked, constants worked out, coats tabulated.
 
 use super::relief::{NormalMap, Relief};
-use super::{CoatValue, Coats, Entry, Facets, FillingValue, Index, Material, Materials, Metal};
+use super::{CoatValue, Coats, Entry, Facets, FillingValue, Index, Material, Materials, Metal, coat_weights};
 use crate::bxdf::{Coat, CoatWeights, Ggx, WalkLimits};
 use crate::interaction::MaterialId;
 use crate::texture::image::read_image;
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 const PAINT_LEVELS: u32 = 17;
 
 /// Parameters of a coat, bit by bit.
-type CoatKey = (u32, u32, u32, bool);
+type CoatKey = (u32, u32, u32, u32, bool);
 
 struct Compiler<'a> {
     desc: &'a SceneDesc,
@@ -32,6 +32,7 @@ struct Compiler<'a> {
     normal_maps: Vec<NormalMap>,
     normal_map_ids: BTreeMap<std::path::PathBuf, Option<u32>>,
     coat_depth_limit: Option<u32>,
+    pbrt_coat_weights: bool,
 }
 
 impl Materials {
@@ -55,11 +56,13 @@ impl Materials {
             normal_maps: Vec::new(),
             normal_map_ids: BTreeMap::new(),
             coat_depth_limit: None,
+            pbrt_coat_weights: false,
         };
         let mut entries: Vec<Entry> =
             desc.materials.iter().map(|m| Entry { material: c.material(&m.kind), relief: c.relief(m) }).collect();
         c.check_mixes(&mut entries);
-        let (coats, normal_maps, coat_depth_limit) = (c.coats, c.normal_maps, c.coat_depth_limit);
+        let (coats, normal_maps) = (c.coats, c.normal_maps);
+        let (coat_depth_limit, pbrt_coat_weights) = (c.coat_depth_limit, c.pbrt_coat_weights);
         let names = desc.materials.iter().map(|m| m.name.clone().unwrap_or_else(|| kind_name(&m.kind).into()));
         Self {
             names: names.collect(),
@@ -68,6 +71,7 @@ impl Materials {
             normal_maps,
             force_diffuse: desc.options.force_diffuse,
             coat_depth_limit,
+            pbrt_coat_weights,
         }
     }
 }
@@ -168,7 +172,8 @@ impl Compiler<'_> {
         }
     }
 
-    fn coat(&mut self, desc: &CoatDesc, over_diffuse: bool) -> CoatValue {
+    /// A coat over a metal with these facets, or over a diffuse base.
+    fn coat(&mut self, desc: &CoatDesc, metal: Option<Facets>) -> CoatValue {
         let facets = self.facets(&desc.roughness);
         let eta = self.index(&desc.eta);
         let thickness =
@@ -191,14 +196,23 @@ impl Compiler<'_> {
             let depth = u32::from(limits.max_depth);
             self.coat_depth_limit = Some(self.coat_depth_limit.map_or(depth, |least| least.min(depth)));
         }
+        let weights = coat_weights(limits);
         let mut tabulated = None;
-        if let (true, Index::Constant(eta), Facets::Constant(ggx), Some(thickness)) =
-            (over_diffuse, eta, facets, thickness.as_constant())
+        if let (None, Index::Constant(eta), Facets::Constant(ggx), Some(thickness)) =
+            (metal, eta, facets, thickness.as_constant())
         {
             let [x, y] = ggx.alphas();
             // Anisotropic coats are not tabulated, but copying one is no slower than making it.
-            let key = (eta.to_bits(), x.to_bits() ^ y.to_bits().rotate_left(13), thickness.to_bits(), x == y);
-            tabulated = Some(self.tabulated(key, || Coat::new(eta, ggx, thickness, CoatWeights::Pbrt)));
+            let exact = weights == CoatWeights::Exact;
+            let key = (eta.to_bits(), x.to_bits(), y.to_bits(), thickness.to_bits(), exact);
+            let id = self.tabulated(key, || Coat::new(eta, ggx, thickness, weights));
+            self.pbrt_coat_weights |= self.coats[id as usize].has_pbrt_weights();
+            tabulated = Some(id);
+        } else if weights == CoatWeights::Pbrt {
+            // Walks use the weights where a rough coat lies over anything that is not a mirror.
+            let smooth = |facets: Facets| matches!(facets, Facets::Constant(ggx) if ggx.is_smooth());
+            let mirror = metal.is_some_and(smooth) && filling.is_none();
+            self.pbrt_coat_weights |= !(smooth(facets) || matches!(eta, Index::Constant(1.0)) || mirror);
         }
         CoatValue { tabulated, eta, facets, thickness, filling, limits }
     }
@@ -249,13 +263,12 @@ impl Compiler<'_> {
             MaterialKind::ThinDielectric { eta } => Material::ThinDielectric { eta: self.index(eta) },
             MaterialKind::CoatedDiffuse { reflectance, coat } => Material::CoatedDiffuse {
                 reflectance: self.reflectance(reflectance, "the reflectance"),
-                coat: self.coat(coat, true),
+                coat: self.coat(coat, None),
             },
-            MaterialKind::CoatedConductor { fresnel, roughness, coat } => Material::CoatedConductor {
-                metal: self.metal(fresnel),
-                facets: self.facets(roughness),
-                coat: self.coat(coat, false),
-            },
+            MaterialKind::CoatedConductor { fresnel, roughness, coat } => {
+                let (metal, facets) = (self.metal(fresnel), self.facets(roughness));
+                Material::CoatedConductor { metal, facets, coat: self.coat(coat, Some(facets)) }
+            }
             MaterialKind::Mix { materials, amount } => {
                 let value = self.textures.float_param(amount.value);
                 if let FloatParam::Value(v) = amount.value {
@@ -339,7 +352,9 @@ impl Compiler<'_> {
         };
         // Paints of the same index that vary share their levels.
         let count = alphas.len() as u32;
-        let key = (index.to_bits(), if count == 1 { alphas[0].to_bits() } else { u32::MAX }, u32::MAX, true);
+        let alpha = if count == 1 { alphas[0].to_bits() } else { u32::MAX };
+        // No coat has a thickness of these bits, which are not a number.
+        let key = (index.to_bits(), alpha, alpha, u32::MAX, true);
         let coats = &mut self.coats;
         let first = *self.coat_ids.entry(key).or_insert_with(|| {
             let first = coats.len() as u32;
