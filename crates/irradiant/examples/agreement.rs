@@ -22,7 +22,8 @@ const TILE: usize = 16;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let pictures = arguments.iter().position(|a| a == "--pictures").and_then(|i| arguments.get(i + 1)).map(PathBuf::from);
+    let pictures =
+        arguments.iter().position(|a| a == "--pictures").and_then(|i| arguments.get(i + 1)).map(PathBuf::from);
     let mut words = arguments.iter().filter(|a| *a != "--pictures" && pictures.as_deref() != Some(Path::new(a)));
     let Some(folder) = words.next() else {
         eprintln!("usage: agreement FOLDER [NAME...] [--pictures DIR]");
@@ -77,7 +78,8 @@ struct Estimate {
 fn compare(scene: &Path, pictures: Option<&Path>) -> Result<bool, String> {
     let reference = read_file(&scene.with_extension("exr"), &ReadOptions::default()).map_err(|e| e.to_string())?;
     let (width, height) = (reference.width(), reference.height());
-    let theirs = Estimate { mean: channels(&reference, ["R", "G", "B"])?, se: channels(&reference, ["SE.R", "SE.G", "SE.B"])? };
+    let theirs =
+        Estimate { mean: channels(&reference, ["R", "G", "B"])?, se: channels(&reference, ["SE.R", "SE.G", "SE.B"])? };
     let facts = facts(&reference)?;
     let spp = (facts.spp / REPLICATES).max(1);
 
@@ -185,7 +187,15 @@ fn compare(scene: &Path, pictures: Option<&Path>) -> Result<bool, String> {
     let mut worst = off;
     worst.sort_by(|a, b| b.excess().total_cmp(&a.excess()));
     for t in worst.iter().take(5) {
-        println!("      tile {:3},{:3}: ours {:.5} theirs {:.5} ratio {:.4} z {:.1}", t.x, t.y, t.ours, t.theirs, t.ours / t.theirs, (t.ours - t.theirs) / t.variance.sqrt());
+        println!(
+            "      tile {:3},{:3}: ours {:.5} theirs {:.5} ratio {:.4} z {:.1}",
+            t.x,
+            t.y,
+            t.ours,
+            t.theirs,
+            t.ours / t.theirs,
+            (t.ours - t.theirs) / t.variance.sqrt()
+        );
     }
     Ok(passed)
 }
@@ -241,7 +251,8 @@ fn channels(image: &Image, names: [&str; 3]) -> Result<Vec<f64>, String> {
 }
 
 fn save_difference(path: PathBuf, width: usize, height: usize, mean: &[f64]) -> Result<(), String> {
-    let image = Image::from_f32(width, height, &["R", "G", "B"], mean.iter().map(|x| *x as f32).collect()).map_err(|e| e.to_string())?;
+    let image = Image::from_f32(width, height, &["R", "G", "B"], mean.iter().map(|x| *x as f32).collect())
+        .map_err(|e| e.to_string())?;
     let bytes = irradiant::image::write(&image, irradiant::image::FileFormat::Exr).map_err(|e| e.to_string())?;
     irradiant::image::atomic_write(&path, &bytes).map_err(|e| e.to_string())
 }

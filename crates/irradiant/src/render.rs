@@ -174,7 +174,8 @@ impl Rendering {
         let image = match format {
             FileFormat::Exr => image,
             FileFormat::Pfm | FileFormat::Hdr => image.to_rgb().unwrap_or(image),
-            _ => irradiant_image::to_srgb8(&image, &ToneOptions { exposure, ..ToneOptions::default() }).map_err(output)?,
+            _ => irradiant_image::to_srgb8(&image, &ToneOptions { exposure, ..ToneOptions::default() })
+                .map_err(output)?,
         };
         let bytes = irradiant_image::write(&image, format).map_err(output)?;
         atomic_write(path, &bytes).map_err(output)

@@ -12,9 +12,7 @@ use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
 use irradiant_image::{Image, ReadOptions};
-use irradiant_scene::desc::{
-    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilterKind, SceneDesc,
-};
+use irradiant_scene::desc::{CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilterKind, SceneDesc};
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
 use std::sync::Arc;
@@ -82,14 +80,8 @@ fn compile(
     let seed = options.seed.or(desc.sampler.seed).unwrap_or(desc.options.seed);
     let space = color_space(film.color_space);
 
-    let camera = camera::compile(
-        &desc.camera,
-        &film,
-        samples_per_pixel,
-        desc.options.render_space,
-        assets,
-        diagnostics,
-    );
+    let camera =
+        camera::compile(&desc.camera, &film, samples_per_pixel, desc.options.render_space, assets, diagnostics);
     let exposure_time = film.exposure_time.map(|t| t.value).or(camera.as_ref().map(|c| c.exposure_time));
     let sensor = sensor(&film, exposure_time.unwrap_or(1.0), space, diagnostics);
     let render_from_world = camera.as_ref().map(|c| c.render_from_world).unwrap_or_default();
@@ -109,11 +101,8 @@ fn compile(
     let (Some(camera), Some(bounds), Some(sensor)) = (camera, bounds, sensor) else { return None };
     let CompiledCamera { camera, camera_from_world, footprint, .. } = camera;
     let light_sampler = LightSampler::new(desc.integrator.light_sampler, &lights);
-    let layers = LayerPlan::new(
-        &film,
-        &camera_from_world.compose(&render_from_world.inverse()),
-        &render_from_world.inverse(),
-    );
+    let layers =
+        LayerPlan::new(&film, &camera_from_world.compose(&render_from_world.inverse()), &render_from_world.inverse());
     let rgb_from_sensor = sensor.output_rgb_from_sensor_rgb(space, options.basis);
     let white = Spectrum::rgb([1.0; 3], Role::Illuminant, space);
     let white = white.scaled(1.0 / irradiant_spectrum::spectrum_to_photometric(&white));
@@ -175,10 +164,7 @@ fn pixel_bounds(film: &FilmDesc, diagnostics: &mut Diagnostics) -> Option<PixelB
         (None, Some(crop)) => {
             let at = |fraction: f32, size: u32| (fraction.clamp(0.0, 1.0) * size as f32).ceil() as i32;
             let [x0, x1, y0, y1] = crop.value;
-            (
-                PixelBounds { x0: at(x0, width), y0: at(y0, height), x1: at(x1, width), y1: at(y1, height) },
-                crop.span,
-            )
+            (PixelBounds { x0: at(x0, width), y0: at(y0, height), x1: at(x1, width), y1: at(y1, height) }, crop.span)
         }
         (None, None) => (full, film.span),
     };
@@ -208,7 +194,8 @@ fn check_filter(desc: &SceneDesc, diagnostics: &mut Diagnostics) {
     };
     if let Some(value) = positive.filter(|v| !(v.value > 0.0 && v.value.is_finite())) {
         diagnostics.push(
-            Diagnostic::error("E0904", format!("{} is out of range", value.value), value.span).help("must be more than 0"),
+            Diagnostic::error("E0904", format!("{} is out of range", value.value), value.span)
+                .help("must be more than 0"),
         );
     }
 }
@@ -232,7 +219,9 @@ fn sensor(
             let near = irradiant_scene::diagnostic::did_you_mean(&film.sensor.value, Sensor::names());
             let help = match (&why, near) {
                 (SensorError::Unknown(_), Some(near)) => format!("did you mean \"{near}\"?"),
-                (SensorError::Unknown(_), None) => format!("known are {}", Sensor::names().collect::<Vec<_>>().join(", ")),
+                (SensorError::Unknown(_), None) => {
+                    format!("known are {}", Sensor::names().collect::<Vec<_>>().join(", "))
+                }
                 (SensorError::Singular(_), _) => "try another white balance temperature".into(),
             };
             diagnostics.push(Diagnostic::error("E0906", why.to_string(), film.sensor.span).help(help));

@@ -110,7 +110,21 @@ impl LayerPlan {
         let n = space.normal(at.n).normalize();
         let ns = space.normal(at.ns).normalize();
         let all = [
-            albedo[0], albedo[1], albedo[2], p.x, p.y, p.z, slope[0], slope[1], n.x, n.y, n.z, ns.x, ns.y, ns.z, footprint.uv.x,
+            albedo[0],
+            albedo[1],
+            albedo[2],
+            p.x,
+            p.y,
+            p.z,
+            slope[0],
+            slope[1],
+            n.x,
+            n.y,
+            n.z,
+            ns.x,
+            ns.y,
+            ns.z,
+            footprint.uv.x,
             footprint.uv.y,
         ];
         values[..all.len()].copy_from_slice(&all);

@@ -21,8 +21,8 @@ use crate::light_sampler::LightSampler;
 use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
-use irradiant_scene::desc::FloatTextureRef;
 use irradiant_math::{Normal3, Point2, Transform, Vec3};
+use irradiant_scene::desc::FloatTextureRef;
 use irradiant_spectrum::{Basis, ColorSpace, SampledSpectrum, Sensor, Spectrum, Wavelengths};
 
 /// Everything that a sample is a function of, but its pixel and index and the integrator.
