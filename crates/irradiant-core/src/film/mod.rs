@@ -265,7 +265,7 @@ pub struct FilmTotals {
     pub min_count: u32,
     /// Most samples in a pixel.
     pub max_count: u32,
-    /// Standard error of the picture relative to its mean, estimated as if samples were independent.
+    /// Mean standard error of a pixel over the mean of the picture, estimated as if samples were independent.
     pub relative_error: f64,
 }
 
@@ -339,7 +339,7 @@ impl Film {
     /// Totals for reports.
     pub fn totals(&self) -> FilmTotals {
         let mut totals = FilmTotals { min_count: u32::MAX, ..Default::default() };
-        let (mut mean, mut error_squared) = (0.0, 0.0);
+        let (mut mean, mut error) = (0.0, 0.0);
         for pixel in &self.tile.pixels {
             totals.samples += pixel.count as u64;
             totals.not_finite += pixel.not_finite as u64;
@@ -348,10 +348,9 @@ impl Film {
             totals.min_count = totals.min_count.min(pixel.count);
             totals.max_count = totals.max_count.max(pixel.count);
             mean += pixel.mean().iter().sum::<f64>();
-            error_squared += pixel.variance().iter().filter(|v| v.is_finite()).sum::<f64>() / pixel.count.max(1) as f64;
+            let known = pixel.variance().into_iter().filter(|v| v.is_finite());
+            error += known.map(|v| (v / pixel.count.max(1) as f64).sqrt()).sum::<f64>();
         }
-        let n = 3.0 * self.tile.pixels.len().max(1) as f64;
-        let (mean, error) = (mean / n, (error_squared / n).sqrt());
         totals.relative_error = if mean > 0.0 { error / mean } else { 0.0 };
         totals.min_count = totals.min_count.min(totals.max_count);
         totals

@@ -108,9 +108,10 @@ fn compile(
     let white = white.scaled(1.0 / irradiant_spectrum::spectrum_to_photometric(&white));
     let filtered = !desc.options.disable_texture_filtering && textures.needs_footprint();
     let facts = facts(desc, &geometry, &materials, &textures, &lights);
-    let mut limits: Vec<String> = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    let truncations = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    let mut biases = Vec::new();
     if film.max_component_value.is_finite() {
-        limits.push(format!("maxcomponentvalue {} (biased)", film.max_component_value.value));
+        biases.push(format!("maxcomponentvalue {}", film.max_component_value.value));
     }
 
     Some(Scene {
@@ -138,7 +139,8 @@ fn compile(
         camera_from_world,
         pixel_jitter: !desc.options.disable_pixel_jitter,
         wavelength_jitter: !desc.options.disable_wavelength_jitter,
-        limits,
+        truncations,
+        biases,
         facts,
     })
 }
