@@ -1,9 +1,10 @@
 //! From a file to a description.
 
 use crate::error::{Error, Report};
+use irradiant_core::scene::{CompileOptions, Scene};
 use irradiant_formats::FileAssets;
-use irradiant_scene::desc::SceneDesc;
-use irradiant_scene::{AssetError, Assets};
+use irradiant_scene::desc::{SceneDesc, ShapeDesc, ShapeKind};
+use irradiant_scene::{AssetError, Assets, Diagnostics, Severity};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -75,11 +76,24 @@ fn read(name: &str, text: Arc<[u8]>, files: FileAssets, folder: &Path) -> Result
     let assets = HashingAssets { files, folder: folder.to_owned(), hashes: Mutex::default() };
     let main_hash = blake3::hash(&text);
     let parsed = irradiant_formats::format_of(Path::new(name)).read(name, text, &assets);
-    let report = Report { diagnostics: parsed.diagnostics, sources: parsed.sources };
+    let mut report = Report { diagnostics: parsed.diagnostics, sources: parsed.sources };
     if report.diagnostics.has_errors() {
+        report.diagnostics.extend(errors_of_compiling(parsed.desc, &assets));
         return Err(Error::Scene(Box::new(report)));
     }
     Ok(SceneFile { name: name.to_owned(), desc: parsed.desc, report, unlimited_depth: false, assets, main_hash })
+}
+
+/// What compiling would refuse in a scene that reading has refused already, so that an author sees all mistakes at once.
+/// Meshes are left out: nobody wants to wait for their trees.
+fn errors_of_compiling(mut desc: SceneDesc, assets: &dyn Assets) -> Diagnostics {
+    let quick = |s: &ShapeDesc| !matches!(s.kind, ShapeKind::Mesh(_));
+    desc.shapes.retain(quick);
+    desc.objects.iter_mut().for_each(|o| o.shapes.retain(quick));
+    let compiled = Scene::compile(&desc, assets, &CompileOptions::default());
+    let mut errors = Diagnostics::default();
+    compiled.diagnostics.iter().filter(|d| d.severity == Severity::Error).for_each(|d| errors.push(d.clone()));
+    errors
 }
 
 /// Files, with a hash of each that was read: two renders whose hashes differ are of different scenes.

@@ -52,7 +52,11 @@ impl Job {
             crop: settings.crop,
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
+            ..CompileOptions::default()
         };
+        if settings.samples_per_pixel == Some(0) {
+            return Err(Error::Settings("0 samples per pixel make no picture".into()));
+        }
         let mut report = file.report.clone();
         let compiled = Scene::compile(&file.desc, &file.assets, &options);
         report.diagnostics.extend(compiled.diagnostics);
@@ -174,7 +178,8 @@ impl Rendering {
         let image = match format {
             FileFormat::Exr => image,
             FileFormat::Pfm | FileFormat::Hdr => image.to_rgb().unwrap_or(image),
-            _ => irradiant_image::to_srgb8(&image, &ToneOptions { exposure, ..ToneOptions::default() }).map_err(output)?,
+            _ => irradiant_image::to_srgb8(&image, &ToneOptions { exposure, ..ToneOptions::default() })
+                .map_err(output)?,
         };
         let bytes = irradiant_image::write(&image, format).map_err(output)?;
         atomic_write(path, &bytes).map_err(output)

@@ -21,8 +21,8 @@ use crate::light_sampler::LightSampler;
 use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
-use irradiant_scene::desc::FloatTextureRef;
 use irradiant_math::{Normal3, Point2, Transform, Vec3};
+use irradiant_scene::desc::FloatTextureRef;
 use irradiant_spectrum::{Basis, ColorSpace, SampledSpectrum, Sensor, Spectrum, Wavelengths};
 
 /// Everything that a sample is a function of, but its pixel and index and the integrator.
@@ -79,6 +79,11 @@ impl Scene {
     /// An empty film for this scene.
     pub fn new_film(&self) -> Film {
         Film::new(self.resolution, self.bounds, self.layers.layers().to_vec())
+    }
+
+    /// The pixels that are rendered.
+    pub fn bounds(&self) -> PixelBounds {
+        self.bounds
     }
 
     /// The alpha test for rays.
