@@ -84,7 +84,8 @@ fn without_o_the_picture_has_the_films_name_in_this_directory() {
 fn a_scene_comes_from_standard_input_too() {
     use std::io::Write;
     let folder = Folder::new("stdin");
-    let mut child = folder.command(&["render", "-", "-o", "x.pfm", "-q"]).stdin(Stdio::piped()).spawn().expect("starts");
+    let mut child =
+        folder.command(&["render", "-", "-o", "x.pfm", "-q"]).stdin(Stdio::piped()).spawn().expect("starts");
     child.stdin.take().expect("piped").write_all(SCENE.as_bytes()).expect("writable");
     assert!(child.wait().expect("ends").success());
     assert_eq!(folder.names(), ["x.pfm"]);
@@ -107,7 +108,10 @@ fn equal_pixels_are_equal_files_for_any_number_of_threads() {
 fn exit_codes_tell_who_can_fix_it() {
     let folder = Folder::new("codes");
     folder.write("broken.pbrt", "WorldBegin\nShape \"spere\"\n");
-    folder.write("mesh.pbrt", "WorldBegin\nLightSource \"infinite\"\nShape \"plymesh\" \"string filename\" \"gone.ply\"\n");
+    folder.write(
+        "mesh.pbrt",
+        "WorldBegin\nLightSource \"infinite\"\nShape \"plymesh\" \"string filename\" \"gone.ply\"\n",
+    );
     folder.write("ok.pbrt", SCENE);
     for (arguments, expected, says) in [
         (&["render", "missing.pbrt"][..], 66, "missing.pbrt"),
@@ -254,8 +258,21 @@ fn versions_and_help_are_there() {
     assert!(stdout(&folder.run(&["--version"])).contains(env!("CARGO_PKG_VERSION")));
     let help = stdout(&folder.run(&["render", "--help"]));
     for flag in [
-        "--output", "--spp", "--time", "--seed", "--threads", "--resolution", "--crop", "--integrator", "--max-depth",
-        "--color", "--exposure", "--preview", "--stats", "--quiet", "--strict",
+        "--output",
+        "--spp",
+        "--time",
+        "--seed",
+        "--threads",
+        "--resolution",
+        "--crop",
+        "--integrator",
+        "--max-depth",
+        "--color",
+        "--exposure",
+        "--preview",
+        "--stats",
+        "--quiet",
+        "--strict",
     ] {
         assert!(help.contains(flag), "{flag} is not documented");
     }

@@ -86,7 +86,7 @@ impl Interaction {
 pub struct TextureContext {
     /// The point, render space.
     pub p: Point3,
-    /// Shading normal.
+    /// Geometric normal (pbrt-v4's textures see it, not the shading one).
     pub n: Normal3,
     /// Surface parameters.
     pub uv: Point2,
@@ -112,7 +112,7 @@ impl TextureContext {
     pub fn point(at: &Interaction) -> Self {
         Self {
             p: at.p,
-            n: at.ns,
+            n: at.n,
             uv: at.uv,
             dpdx: Vec3::ZERO,
             dpdy: Vec3::ZERO,

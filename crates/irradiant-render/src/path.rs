@@ -38,7 +38,7 @@ impl Integrator for PathIntegrator {
 
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
-        let regularize = self.regularize.then(|| Limit::Bias("regularize (biased)".into()));
+        let regularize = self.regularize.then(|| Limit::Bias("regularize".into()));
         depth.into_iter().chain(regularize).collect()
     }
 }
@@ -217,7 +217,8 @@ impl PathIntegrator {
             return SampledSpectrum::ZERO;
         }
         let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
-            scene.light_sampler.pmf(&p.reference, light) * scene.lights.get(light).pdf_hit(&p.reference, ray.d, &at.into())
+            scene.light_sampler.pmf(&p.reference, light)
+                * scene.lights.get(light).pdf_hit(&p.reference, ray.d, &at.into())
         });
         let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
         let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };

@@ -60,7 +60,8 @@ impl Integrator for SimplePathIntegrator {
                 }
                 if self.sample_lights && bsdf.flags().is_non_specular() {
                     let draws = sample.stream.light(depth);
-                    if let Some(PickedLight { id: light, pmf }) = scene.light_sampler.sample(&at.reference(), draws.pick)
+                    if let Some(PickedLight { id: light, pmf }) =
+                        scene.light_sampler.sample(&at.reference(), draws.pick)
                         && let Some(s) =
                             scene.lights.get(light).sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
                     {
@@ -75,7 +76,9 @@ impl Integrator for SimplePathIntegrator {
                 }
                 let draws = sample.stream.scatter(depth);
                 let wi = if self.sample_bsdf {
-                    let Some(s) = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else { break };
+                    let Some(s) = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
+                        break;
+                    };
                     throughput *= s.f * (s.wi.dot(bsdf.frame.z).abs() / s.pdf);
                     count_emission = !self.sample_lights || s.lobe.is_specular();
                     s.wi
@@ -119,7 +122,11 @@ impl Integrator for SimplePathIntegrator {
 
 /// All environments along a ray.
 pub(crate) fn environment(scene: &Scene, ray: &Ray, lambda: &Wavelengths) -> SampledSpectrum {
-    scene.lights.environments().iter().fold(SampledSpectrum::ZERO, |sum, &l| sum + scene.lights.get(l).escaped(ray, lambda))
+    scene
+        .lights
+        .environments()
+        .iter()
+        .fold(SampledSpectrum::ZERO, |sum, &l| sum + scene.lights.get(l).escaped(ray, lambda))
 }
 
 /// Uniform over the directions that the surface can scatter to: a hemisphere or the sphere.

@@ -118,7 +118,10 @@ fn white_bodies_vanish_in_a_white_furnace() {
     // Under light of 1 from everywhere lossless convex bodies cannot be seen. 0.5 % of loss or gain would be.
     for (name, material) in [
         ("diffuse", "\"diffuse\" \"rgb reflectance\" [ 1 1 1 ]"),
-        ("mirror", "\"conductor\" \"spectrum eta\" [ 300 1e-4 900 1e-4 ] \"spectrum k\" [ 300 1000 900 1000 ] \"float roughness\" 0"),
+        (
+            "mirror",
+            "\"conductor\" \"spectrum eta\" [ 300 1e-4 900 1e-4 ] \"spectrum k\" [ 300 1000 900 1000 ] \"float roughness\" 0",
+        ),
         ("glass", "\"dielectric\" \"float eta\" 1.5"),
         ("thin pane", "\"thindielectric\" \"float eta\" 1.5"),
     ] {

@@ -200,3 +200,15 @@ fn a_film_beyond_memory_is_refused_before_it_is_made() {
     let part = RenderSettings { crop: Some([0.0, 0.01, 0.0, 0.01]), ..RenderSettings::default() };
     assert!(Job::new(&file, &part).is_ok());
 }
+
+#[test]
+fn the_memory_of_a_film_is_known_before_it_is_made() {
+    for (kind, more, channels) in [("rgb", "", 0), ("gbuffer", "", 17), ("spectral", "\"integer nbuckets\" 5", 5)] {
+        let text = format!("Film \"{kind}\" {more} WorldBegin");
+        let file = load_text("film.pbrt", &text, ".").unwrap_or_else(|e| panic!("{e}"));
+        let job = Job::new(&file, &RenderSettings { resolution: Some([2, 2]), ..Default::default() });
+        let film = job.unwrap_or_else(|e| panic!("{e}")).scene.new_film();
+        assert_eq!(film.channels_per_pixel() as u64, channels);
+        assert_eq!(irradiant::core::scene::LayerPlan::channels_of(&file.desc.film), channels);
+    }
+}

@@ -41,7 +41,13 @@ fn instances() {
         "{HEAD}{VIEW}Material \"diffuse\"\n{FLOOR}ObjectBegin \"thing\"\nMaterial \"dielectric\"\nShape \"sphere\" \"float radius\" 0.3\nMaterial \"diffuse\" \"rgb reflectance\" [ .8 .2 .1 ]\nTranslate 0 0.5 0\nShape \"disk\" \"float radius\" 0.4\nObjectEnd\n"
     );
     for i in 0..12 {
-        scene += &format!("AttributeBegin\nTranslate {} {} {}\nRotate {} 0 1 0\nObjectInstance \"thing\"\nAttributeEnd\n", i % 4 - 2, i / 4 - 1, i % 3, 30 * i);
+        scene += &format!(
+            "AttributeBegin\nTranslate {} {} {}\nRotate {} 0 1 0\nObjectInstance \"thing\"\nAttributeEnd\n",
+            i % 4 - 2,
+            i / 4 - 1,
+            i % 3,
+            30 * i
+        );
     }
     assert_same(&scene);
 }

@@ -16,6 +16,8 @@
 pub mod relief;
 
 mod compile;
+#[cfg(test)]
+mod tests;
 
 use crate::bsdf::Bsdf;
 use crate::bxdf::{

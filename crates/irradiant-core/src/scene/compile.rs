@@ -119,16 +119,18 @@ fn compile(
     }
     let CompiledCamera { camera, camera_from_world, footprint, .. } = camera;
     let light_sampler = LightSampler::new(desc.integrator.light_sampler, &lights);
-    let layers =
-        LayerPlan::new(&film, &camera_from_world.compose(&render_from_world.inverse()), &render_from_world.inverse());
+    let world_from_render = render_from_world.inverse();
+    let camera_from_render = camera_from_world.compose(&world_from_render);
+    let layers = LayerPlan::new(&film, space, options.basis, &camera_from_render, &world_from_render);
     let rgb_from_sensor = sensor.output_rgb_from_sensor_rgb(space, options.basis);
     let white = Spectrum::rgb([1.0; 3], Role::Illuminant, space);
     let white = white.scaled(1.0 / irradiant_spectrum::spectrum_to_photometric(&white));
     let filtered = !desc.options.disable_texture_filtering && textures.needs_footprint();
     let facts = facts(desc, &geometry, &materials, &textures, &lights);
-    let mut limits: Vec<String> = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    let truncations = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    let mut biases = Vec::new();
     if film.max_component_value.is_finite() {
-        limits.push(format!("maxcomponentvalue {} (biased)", film.max_component_value.value));
+        biases.push(format!("maxcomponentvalue {}", film.max_component_value.value));
     }
 
     Some(Scene {
@@ -156,7 +158,8 @@ fn compile(
         camera_from_world,
         pixel_jitter: !desc.options.disable_pixel_jitter,
         wavelength_jitter: !desc.options.disable_wavelength_jitter,
-        limits,
+        truncations,
+        biases,
         facts,
     })
 }
@@ -198,12 +201,7 @@ fn pixel_bounds(film: &FilmDesc, diagnostics: &mut Diagnostics) -> Option<PixelB
 
 /// Complains of a film that is too large for the memory it may take; says what to do.
 fn fits(bounds: &PixelBounds, film: &FilmDesc, limit: u64, diagnostics: &mut Diagnostics) -> bool {
-    let channels = match &film.kind {
-        FilmKind::Rgb => 0,
-        FilmKind::Gbuffer { .. } => 16,
-        FilmKind::Spectral { n_buckets, .. } => n_buckets.value as u64,
-    };
-    let bytes = (bounds.area() as u64).saturating_mul(Film::bytes_per_pixel(channels));
+    let bytes = (bounds.area() as u64).saturating_mul(Film::bytes_per_pixel(LayerPlan::channels_of(film)));
     if bytes > limit {
         let gib = |bytes: u64| bytes as f64 / (1u64 << 30) as f64;
         let [width, height] = [bounds.width(), bounds.height()];

@@ -240,8 +240,7 @@ impl<V: Copy> BasicNode<V> {
             | Self::Checkerboard { tex1, tex2, .. }
             | Self::SolidCheckerboard { tex1, tex2, .. } => half(*tex1, *tex2),
             Self::Bilerp { corners, .. } => corners.iter().fold(T::ZERO, |sum, &v| sum.plus(input(v).times(0.25))),
-            // A dot in half of the cells, each of area pi 0.35^2.
-            Self::Dots { inside, outside, .. } => T::lerp(0.192_4, || input(*outside), || input(*inside)),
+            Self::Dots { inside, outside, .. } => T::lerp(procedural::DOT_SHARE, || input(*outside), || input(*inside)),
         }
     }
 }

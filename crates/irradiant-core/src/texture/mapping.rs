@@ -209,7 +209,8 @@ mod tests {
         close(map(uv, Point3::new(0.0, 0.0, 0.0)), [0.7, 1.6]);
         let c = Mapping::compile(&uv, &identity, &identity).unwrap();
         let c = c.map(&context(Point3::new(0.0, 0.0, 0.0), Vec3::ZERO, Vec3::ZERO));
-        assert_eq!((c.dx, c.dy), ([0.02, -0.09], [0.04, 0.12]));
+        close(c.dx, [0.02, -0.09]);
+        close(c.dy, [0.04, 0.12]);
         let planar = MappingDesc::Planar { v1: [1.0, 0.0, 0.0], v2: [0.0, 2.0, 0.0], u_delta: 0.5, v_delta: 1.0 };
         close(map(planar, Point3::new(3.0, 4.0, 5.0)), [3.5, 9.0]);
     }

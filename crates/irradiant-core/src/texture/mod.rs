@@ -20,6 +20,8 @@ pub mod mapping;
 pub mod procedural;
 
 mod compile;
+#[cfg(test)]
+mod tests;
 
 pub use image::ImageTexture;
 pub use mapping::Mapping;

@@ -44,7 +44,11 @@ pub fn solid_checkerboard(c: &SolidCoordinates) -> f32 {
     0.5 - 0.5 * wave(0) * wave(1) * wave(2)
 }
 
-/// Whether (s, t) lies in a polka dot: about every second unit cell holds one of radius 0.35, shifted at random.
+/// The share of the plane that polka dots cover.
+pub const DOT_SHARE: f32 = 0.153;
+
+/// Whether (s, t) lies in a polka dot: two in five unit cells hold one of radius 0.35, shifted at
+/// random. (The noise that decides is symmetric, but exactly 0 in every fifth cell's centre.)
 pub fn in_polka_dot(s: f32, t: f32) -> bool {
     let (cell_s, cell_t) = ((s + 0.5).floor(), (t + 0.5).floor());
     let random = |ds: f32, dt: f32| noise(Point3::new(cell_s + ds, cell_t + dt, 0.5));
@@ -138,6 +142,14 @@ mod tests {
 
     #[test]
     fn blurred_boards_are_grey() {
+        // A tent of half-width 1.5 x 0.1 at 0.05 from an edge: (1 - 0.05/0.15)^2 / 2 of it lie beyond.
+        assert!((checkerboard(&at(0.95, 0.5, 0.1)) - 2.0 / 9.0).abs() < 1e-5);
+        let c = SolidCoordinates {
+            p: Point3::new(0.5, 0.95, 0.5),
+            dpdx: Vec3::new(0.02, -0.03, 0.0),
+            dpdy: Vec3::new(0.0, 0.1, 0.01),
+        };
+        assert!((solid_checkerboard(&c) - 2.0 / 9.0).abs() < 1e-5);
         assert!((checkerboard(&at(0.3, 0.7, 500.0)) - 0.5).abs() < 1e-4);
         let wide =
             SolidCoordinates { p: Point3::new(0.1, 0.2, 0.3), dpdx: Vec3::new(300.0, 300.0, 300.0), dpdy: Vec3::ZERO };
@@ -148,17 +160,27 @@ mod tests {
         assert_eq!((sharp(0.5, 0.5, 0.5), sharp(0.5, 0.5, 1.5), sharp(1.5, 0.5, 1.5)), (0.0, 1.0, 0.0));
     }
 
-    // Half of the cells are expected to hold a dot of area pi 0.35^2: 0.19; the share of 200 x 200 cells is known to 3 %.
+    // Dots are whole within their cells, so their share is that of cells that hold one times pi 0.35^2: both are counted.
+    // The grid knows the area to 1 %; a radius or a shift wrong by 2 % fails.
     #[test]
     fn dots_cover_their_share() {
-        let (mut inside, n) = (0, 1000);
+        let (mut inside, mut cells, n) = (0, 0, 256);
         for i in 0..n {
             for j in 0..n {
-                inside += i32::from(in_polka_dot(i as f32 * 0.2 + 0.013, j as f32 * 0.2 + 0.071));
+                let (x, y) = (i as f32, j as f32);
+                cells += i32::from(noise(Point3::new(x + 0.5, y + 0.5, 0.5)) > 0.0);
+                for (k, l) in (0..25).map(|k| (k % 5, k / 5)) {
+                    let jitter = ((i * 31 + j * 17) % 64) as f32 * (0.2 / 64.0);
+                    let (s, t) = (x - 0.5 + k as f32 * 0.2 + jitter, y - 0.5 + l as f32 * 0.2 + 0.2 - jitter);
+                    inside += i32::from(in_polka_dot(s, t));
+                }
             }
         }
-        let share = f64::from(inside) / f64::from(n * n);
-        assert!((share - 0.19).abs() < 0.02, "{share}");
+        let (all, cells) = (f64::from(n * n), f64::from(cells));
+        let share = f64::from(inside) / (25.0 * all);
+        let expected = cells / all * std::f64::consts::PI * 0.35 * 0.35;
+        assert!((share / expected - 1.0).abs() < 0.01, "{share} {expected}");
+        assert!((share - DOT_SHARE as f64).abs() < 0.002, "{share}");
     }
 
     #[test]
