@@ -52,7 +52,11 @@ impl Job {
             crop: settings.crop,
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
+            ..CompileOptions::default()
         };
+        if settings.samples_per_pixel == Some(0) {
+            return Err(Error::Settings("0 samples per pixel make no picture".into()));
+        }
         let mut report = file.report.clone();
         let compiled = Scene::compile(&file.desc, &file.assets, &options);
         report.diagnostics.extend(compiled.diagnostics);

@@ -291,6 +291,11 @@ impl Film {
         Self { full_resolution, tile: FilmTile::new(bounds, channels), layers }
     }
 
+    /// Memory that a film takes for each pixel, bytes, when its layers have so many channels.
+    pub const fn bytes_per_pixel(channels: u64) -> u64 {
+        size_of::<Pixel>() as u64 + channels.saturating_mul(size_of::<ExactSum>() as u64)
+    }
+
     /// Width and height of the image that this is a (perhaps cropped) film of.
     pub fn full_resolution(&self) -> [u32; 2] {
         self.full_resolution

@@ -17,7 +17,9 @@ use crate::interaction::{LightId, MaterialId, ShapeId};
 use irradiant_bvh as bvh;
 use irradiant_math::{Affine, AnimatedTransform, Bounds3, Transform};
 use irradiant_scene::desc::shape::{CurveData, CurveStyle};
-use irradiant_scene::desc::{FloatParam, MaterialRef, MeshData, MotionDesc, SceneDesc, ShapeDesc, ShapeKind};
+use irradiant_scene::desc::{
+    FloatParam, MaterialDesc, MaterialKind, MaterialRef, MeshData, MotionDesc, SceneDesc, ShapeDesc, ShapeKind,
+};
 use irradiant_scene::{Diagnostic, Diagnostics, Span, Spanned};
 
 /// Curves may be split into at most 2^this pieces per segment.
@@ -40,6 +42,7 @@ pub fn compile_geometry(
         emitters: Vec::new(),
         face_emitters: Vec::new(),
         material: &material,
+        materials: &desc.materials,
         diagnostics,
     };
     let mut scene = Members::default();
@@ -92,6 +95,7 @@ struct Compiler<'a, F> {
     emitters: Vec<Emitter>,
     face_emitters: Vec<u32>,
     material: &'a F,
+    materials: &'a [MaterialDesc],
     diagnostics: &'a mut Diagnostics,
 }
 
@@ -152,8 +156,11 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
 
     /// Adds the primitives of a shape under `t`.
     fn members(&mut self, desc: &ShapeDesc, id: u32, t: &Transform, members: &mut Members, emits: bool) {
-        // What is nowhere cannot be met; it may emit all the same (pbrt's way to hide lights).
-        let there = self.shapes.infos[id as usize].alpha != Alpha::Constant(0.0);
+        // What is nowhere cannot be met; it may emit all the same (pbrt's way to hide lights). An interface is no surface
+        // but the boundary of a medium: without media nothing is there, and light passes to all sides, as in volpath.
+        let interface =
+            self.materials.get(desc.material.0 as usize).is_some_and(|m| matches!(m.kind, MaterialKind::Interface));
+        let there = self.shapes.infos[id as usize].alpha != Alpha::Constant(0.0) && !interface;
         if !t.m.iter().flatten().all(|x| x.is_finite()) {
             return self.error("E0505", "the transform of this shape is not finite", desc.span, "");
         }

@@ -67,6 +67,7 @@ impl LayerPlan {
         }
         let n_buckets = layers.iter().filter(|l| matches!(l, Layer::Bucket { .. })).count();
         let channels = layers.iter().map(Layer::n_channels).sum();
+        debug_assert_eq!(channels as u64, Self::channels_of(film));
         let observer = Sensor::cie1931();
         Self {
             rgb_from_observer: observer.output_rgb_from_sensor_rgb(space, basis),
@@ -79,6 +80,15 @@ impl LayerPlan {
             n_buckets,
             lambda_range,
             variance: matches!(film.kind, FilmKind::Gbuffer { .. }),
+        }
+    }
+
+    /// Number of channels that the layers of a film will have, without making them: what it says may be absurd.
+    pub fn channels_of(film: &FilmDesc) -> u64 {
+        match &film.kind {
+            FilmKind::Rgb => 0,
+            FilmKind::Gbuffer { .. } => 17,
+            FilmKind::Spectral { n_buckets, .. } => n_buckets.value as u64,
         }
     }
 

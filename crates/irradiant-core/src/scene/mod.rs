@@ -82,6 +82,11 @@ impl Scene {
         Film::new(self.resolution, self.bounds, self.layers.layers().to_vec())
     }
 
+    /// The pixels that are rendered.
+    pub fn bounds(&self) -> PixelBounds {
+        self.bounds
+    }
+
     /// The alpha test for rays.
     #[inline]
     pub fn alpha(&self) -> SceneAlpha<'_> {
