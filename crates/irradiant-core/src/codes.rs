@@ -62,6 +62,15 @@ pub const CODES: &[(&str, &str)] = &[
     ("E0904", "A parameter of a filter is out of its range."),
     ("E0905", "Exposure time, ISO speed and white balance are positive."),
     ("E0906", "No sensor has this name, or it cannot be used like this."),
+    (
+        "E0907",
+        "The film would take more memory than is allowed: sums and counts of a pixel take 112 bytes, each further channel 16. \
+         Render the picture in parts with a crop window, or make it smaller.",
+    ),
+    (
+        "E0908",
+        "The buckets of a spectral film lie between two different wavelengths in nm and are at least 0.01 nm wide each.",
+    ),
     ("E0910", "The shutter opens and closes at finite times."),
     ("E0911", "The transform of the camera is made of translations, rotations and scales that are not 0."),
     ("E0912", "A parameter of the camera is out of its range; the label says which is meant."),

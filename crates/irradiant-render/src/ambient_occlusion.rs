@@ -61,6 +61,6 @@ impl Integrator for AmbientOcclusionIntegrator {
     }
 
     fn limits(&self) -> Vec<Limit> {
-        vec![Limit::OtherQuantity("ambient occlusion, not radiance")]
+        vec![Limit::OtherQuantity("ambient occlusion")]
     }
 }

@@ -34,7 +34,8 @@ pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample
     let lambda = scene.sample_wavelengths(draws.wavelength);
     let filtered = scene.filter.sample(scene.film_draw(draws.film));
     let film = Point2::new(pixel[0] as f32 + 0.5 + filtered.offset[0], pixel[1] as f32 + 0.5 + filtered.offset[1]);
-    let camera_ray = scene.camera.generate_ray(film, draws.lens, draws.time);
+    let lens = if scene.camera.has_lens() { stream.lens() } else { Point2::new(0.5, 0.5) };
+    let camera_ray = scene.camera.generate_ray(film, lens, draws.time);
     CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
 }
 

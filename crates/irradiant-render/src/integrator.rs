@@ -67,6 +67,8 @@ pub trait Integrator: Send + Sync {
 pub enum Limit {
     /// Light after more scattering events than this is left out.
     MaxDepth(u32),
+    /// Named truncation.
+    Truncation(String),
     /// The estimator computes something else than the rendering equation's solution.
     OtherQuantity(&'static str),
     /// Named bias.
@@ -78,7 +80,7 @@ impl std::fmt::Display for Limit {
         match self {
             Self::MaxDepth(n) => write!(f, "maxdepth {n}"),
             Self::OtherQuantity(what) => write!(f, "{what}"),
-            Self::Bias(what) => write!(f, "{what}"),
+            Self::Truncation(what) | Self::Bias(what) => write!(f, "{what}"),
         }
     }
 }

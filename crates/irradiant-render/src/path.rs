@@ -38,7 +38,7 @@ impl Integrator for PathIntegrator {
 
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
-        let regularize = self.regularize.then(|| Limit::Bias("regularize (biased)".into()));
+        let regularize = self.regularize.then(|| Limit::Bias("regularize".into()));
         depth.into_iter().chain(regularize).collect()
     }
 }

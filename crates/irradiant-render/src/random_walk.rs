@@ -74,6 +74,6 @@ impl Integrator for RandomWalkIntegrator {
 
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
-        depth.into_iter().chain([Limit::OtherQuantity("no delta lights or lobes")]).collect()
+        depth.into_iter().chain([Limit::OtherQuantity("radiance without delta lights and delta lobes")]).collect()
     }
 }

@@ -28,24 +28,17 @@ pub struct Wavelengths {
     pub basis: Basis,
 }
 
-/// A wavelength in nm by the visible-weighted density, from `u` in [0, 1].
-#[inline]
-pub fn sample_visible_wavelength(u: f32) -> f32 {
-    wavelength_of_tanh(visible_tanh(u))
-}
-
-/// The density at its peak, 538 nm.
-const VISIBLE_PEAK: f32 = 0.003_939_804_2;
-
-/// tanh of the place on the density's axis, in [-0.971, 0.857].
-#[inline]
-fn visible_tanh(u: f32) -> f32 {
+/// The hyperbolic tangent that `u` chooses, by which the visible-weighted density is uniform.
+#[inline(always)]
+fn visible_height(u: f32) -> f32 {
     0.856_910_62 - 1.827_502 * u
 }
 
+/// A wavelength in nm by the visible-weighted density, from `u` in [0, 1].
 #[inline]
-fn wavelength_of_tanh(y: f32) -> f32 {
+pub fn sample_visible_wavelength(u: f32) -> f32 {
     // atanh(y) = ln((1 + y) / (1 - y)) / 2; |y| < 0.971 here, so neither end loses digits.
+    let y = visible_height(u);
     538.0 - 138.888_89 * 0.5 * ln((1.0 + y) / (1.0 - y))
 }
 
@@ -57,7 +50,7 @@ pub fn visible_wavelength_pdf(lambda: f32) -> f32 {
     }
     // 1 / cosh(x)^2 = 4 e / (1 + e)^2 with e = exp(-2 |x|), which cannot overflow.
     let e = exp(-2.0 * (0.0072 * (lambda - 538.0)).abs());
-    VISIBLE_PEAK * 4.0 * e / ((1.0 + e) * (1.0 + e))
+    0.003_939_804_2 * 4.0 * e / ((1.0 + e) * (1.0 + e))
 }
 
 impl Wavelengths {
@@ -69,13 +62,15 @@ impl Wavelengths {
         let mut lambda = [0.0; N_WAVELENGTHS];
         let mut pdf = [0.0; N_WAVELENGTHS];
         for i in 0..N_WAVELENGTHS {
-            let rotated = u + i as f32 / N_WAVELENGTHS as f32;
-            let rotated = if rotated > 1.0 { rotated - 1.0 } else { rotated };
-            let y = visible_tanh(rotated);
+            let mut rotated = u + i as f32 / N_WAVELENGTHS as f32;
+            if rotated > 1.0 {
+                rotated -= 1.0;
+            }
             // Rounding may step a hair outside the range, where the pdf would be 0.
-            lambda[i] = wavelength_of_tanh(y).clamp(LAMBDA_MIN, LAMBDA_MAX);
-            // 1 / cosh(x)^2 = 1 - tanh(x)^2: no exponential needed where y is at hand.
-            pdf[i] = VISIBLE_PEAK * ((1.0 - y) * (1.0 + y));
+            lambda[i] = sample_visible_wavelength(rotated).clamp(LAMBDA_MIN, LAMBDA_MAX);
+            // 1 / cosh(atanh y)^2 = 1 - y^2: visible_wavelength_pdf without its exponential.
+            let y = visible_height(rotated);
+            pdf[i] = 0.003_939_804_2 * (1.0 - y) * (1.0 + y);
         }
         Self { lambda, pdf, basis: Basis::Spectral }
     }

@@ -1,9 +1,10 @@
 //! From a file to a description.
 
 use crate::error::{Error, Report};
+use irradiant_core::scene::{CompileOptions, Scene};
 use irradiant_formats::FileAssets;
-use irradiant_scene::desc::SceneDesc;
-use irradiant_scene::{AssetError, Assets};
+use irradiant_scene::desc::{SceneDesc, ShapeDesc, ShapeKind};
+use irradiant_scene::{AssetError, Assets, Diagnostic, Diagnostics, Severity};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -75,11 +76,46 @@ fn read(name: &str, text: Arc<[u8]>, files: FileAssets, folder: &Path) -> Result
     let assets = HashingAssets { files, folder: folder.to_owned(), hashes: Mutex::default() };
     let main_hash = blake3::hash(&text);
     let parsed = irradiant_formats::format_of(Path::new(name)).read(name, text, &assets);
-    let report = Report { diagnostics: parsed.diagnostics, sources: parsed.sources };
+    let mut report = Report { diagnostics: parsed.diagnostics, sources: parsed.sources };
     if report.diagnostics.has_errors() {
+        let more = errors_of_compiling(parsed.desc, &report);
+        report.diagnostics.extend(more);
         return Err(Error::Scene(Box::new(report)));
     }
     Ok(SceneFile { name: name.to_owned(), desc: parsed.desc, report, unlimited_depth: false, assets, main_hash })
+}
+
+/// What compiling would refuse in a scene that reading has refused already, so that an author sees all mistakes at once.
+///
+/// Meshes and images are left out: nobody wants to wait for them. So is what has no place, and what is wrong in a line of
+/// which reading has complained: it would be the same mistake in other words.
+fn errors_of_compiling(mut desc: SceneDesc, told: &Report) -> Diagnostics {
+    struct NoFiles;
+    impl Assets for NoFiles {
+        fn read(&self, _: &Path) -> Result<Arc<[u8]>, AssetError> {
+            Err(AssetError::NotFound)
+        }
+        fn resolve(&self, name: &str) -> PathBuf {
+            PathBuf::from(name)
+        }
+        fn exists(&self, _: &Path) -> bool {
+            false
+        }
+    }
+    let quick = |s: &ShapeDesc| !matches!(s.kind, ShapeKind::Mesh(_));
+    desc.shapes.retain(quick);
+    desc.objects.iter_mut().for_each(|o| o.shapes.retain(quick));
+    let line = |d: &Diagnostic| told.sources.locate(d.labels[0].0).map(|l| (d.labels[0].0.file, l.0));
+    let lines: Vec<_> = told.diagnostics.iter().map(line).collect();
+    let compiled = Scene::compile(&desc, &NoFiles, &CompileOptions::default());
+    let mut errors = Diagnostics::default();
+    for d in compiled.diagnostics.iter() {
+        let at = line(d);
+        if d.severity == Severity::Error && !d.missing_file && at.is_some() && !lines.contains(&at) {
+            errors.push(d.clone());
+        }
+    }
+    errors
 }
 
 /// Files, with a hash of each that was read: two renders whose hashes differ are of different scenes.

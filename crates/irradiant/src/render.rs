@@ -52,7 +52,11 @@ impl Job {
             crop: settings.crop,
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
+            ..CompileOptions::default()
         };
+        if settings.samples_per_pixel == Some(0) {
+            return Err(Error::Settings("0 samples per pixel make no picture".into()));
+        }
         let mut report = file.report.clone();
         let compiled = Scene::compile(&file.desc, &file.assets, &options);
         report.diagnostics.extend(compiled.diagnostics);
@@ -205,14 +209,23 @@ fn integrator_name(kind: &IntegratorKind) -> String {
     }
 }
 
-/// "unbiased", or why not.
+/// "unbiased", or why not: what is left out, what is biased, what else is estimated.
 fn estimate_label(integrator: &dyn Integrator, scene: &Scene) -> String {
     let mut limits = integrator.limits();
-    limits.extend(scene.limits().into_iter().map(Limit::Bias));
-    if limits.is_empty() {
-        return "unbiased".into();
+    // Light passes a surface's models only where the integrator asks them for it.
+    if !limits.iter().any(|l| matches!(l, Limit::OtherQuantity(_))) {
+        limits.extend(scene.truncations().iter().cloned().map(Limit::Truncation));
     }
-    let list = limits.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let biased = limits.iter().any(|l| matches!(l, Limit::Bias(what) if what.contains("biased")));
-    format!("{}: {list}", if biased { "biased" } else { "truncated" })
+    limits.extend(scene.biases().iter().cloned().map(Limit::Bias));
+    let group = |word: &str, belongs: &dyn Fn(&Limit) -> bool| {
+        let list: Vec<String> = limits.iter().filter(|l| belongs(l)).map(ToString::to_string).collect();
+        (!list.is_empty()).then(|| format!("{word}: {}", list.join(", ")))
+    };
+    let groups = [
+        group("truncated", &|l| matches!(l, Limit::MaxDepth(_) | Limit::Truncation(_))),
+        group("biased", &|l| matches!(l, Limit::Bias(_))),
+        group("estimates", &|l| matches!(l, Limit::OtherQuantity(_))),
+    ];
+    let label = groups.into_iter().flatten().collect::<Vec<_>>().join("; ");
+    if label.is_empty() { "unbiased".into() } else { label }
 }

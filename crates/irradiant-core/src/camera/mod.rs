@@ -123,6 +123,17 @@ impl Camera {
         self.scaled_ray(film, lens, time_u, self.footprint_scale)
     }
 
+    /// True when rays depend on a place on the lens.
+    #[inline]
+    pub fn has_lens(&self) -> bool {
+        match &self.model {
+            Model::Perspective(model) => model.has_lens(),
+            Model::Orthographic(model) => model.has_lens(),
+            Model::Spherical(_) => false,
+            Model::Realistic(_) => true,
+        }
+    }
+
     /// The shutter's time at a fraction of its interval.
     #[inline]
     pub fn time(&self, time_u: f32) -> f32 {

@@ -94,6 +94,11 @@ impl Perspective {
         }
     }
 
+    /// True when rays depend on a place on the lens.
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
+    }
+
     #[inline]
     pub fn ray(&self, film: Point2, lens: Point2) -> ModelRay {
         let focus = self.corner + self.dx * film.x + self.dy * film.y;
@@ -135,6 +140,11 @@ impl Orthographic {
             forward: vector(space_from_camera, [0.0, 0.0, z]),
             lens: lens_axes(lens, space_from_camera),
         }
+    }
+
+    /// True when rays depend on a place on the lens.
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
     }
 
     #[inline]

@@ -11,7 +11,11 @@ pub use develop::DevelopOptions;
 
 use exact::{ExactSum, SquareSum};
 
-/// What a film keeps beside radiance, channel by channel; all are means over the pixel's samples.
+/// What a film keeps beside radiance, channel by channel.
+///
+/// As pbrt-v4's gbuffer film has them: reflectance is a mean over the pixel's samples; positions, slopes and texture
+/// coordinates are means over those that hit something (told by [`Layer::Hits`], without which: all of them); slopes
+/// without their sign; normals the direction of their sum. All are 0 where nothing was hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Layer {
     /// Reflectance at the first visible surface (R, G, B).
@@ -26,6 +30,8 @@ pub enum Layer {
     ShadingNormal,
     /// Texture coordinates of the first hit (u, v).
     Uv,
+    /// Number of samples that hit something; kept, not written.
+    Hits,
     /// Radiance averaged over a wavelength interval; one channel.
     Bucket {
         /// Least wavelength, nm.
@@ -41,11 +47,11 @@ impl Layer {
         match self {
             Self::Albedo | Self::Position | Self::Normal | Self::ShadingNormal => 3,
             Self::DepthSlope | Self::Uv => 2,
-            Self::Bucket { .. } => 1,
+            Self::Hits | Self::Bucket { .. } => 1,
         }
     }
 
-    /// Channel names as pbrt-v4 writes them.
+    /// Channel names as pbrt-v4 writes them; none for what is not written.
     pub fn channel_names(&self) -> Vec<String> {
         let names = |list: &[&str]| list.iter().map(|s| s.to_string()).collect();
         match self {
@@ -55,6 +61,7 @@ impl Layer {
             Self::Normal => names(&["N.X", "N.Y", "N.Z"]),
             Self::ShadingNormal => names(&["Ns.X", "Ns.Y", "Ns.Z"]),
             Self::Uv => names(&["u", "v"]),
+            Self::Hits => Vec::new(),
             Self::Bucket { lambda_min, lambda_max } => {
                 vec![format!("S0.{:.3}nm", 0.5 * (lambda_min + lambda_max)).replace('.', ",").replacen("S0,", "S0.", 1)]
             }
@@ -265,7 +272,7 @@ pub struct FilmTotals {
     pub min_count: u32,
     /// Most samples in a pixel.
     pub max_count: u32,
-    /// Standard error of the picture relative to its mean, estimated as if samples were independent.
+    /// Mean standard error of a pixel over the mean of the picture, estimated as if samples were independent.
     pub relative_error: f64,
 }
 
@@ -282,6 +289,11 @@ impl Film {
     pub fn new(full_resolution: [u32; 2], bounds: PixelBounds, layers: Vec<Layer>) -> Self {
         let channels = layers.iter().map(Layer::n_channels).sum();
         Self { full_resolution, tile: FilmTile::new(bounds, channels), layers }
+    }
+
+    /// Memory that a film takes for each pixel, bytes, when its layers have so many channels.
+    pub const fn bytes_per_pixel(channels: u64) -> u64 {
+        size_of::<Pixel>() as u64 + channels.saturating_mul(size_of::<ExactSum>() as u64)
     }
 
     /// Width and height of the image that this is a (perhaps cropped) film of.
@@ -339,7 +351,7 @@ impl Film {
     /// Totals for reports.
     pub fn totals(&self) -> FilmTotals {
         let mut totals = FilmTotals { min_count: u32::MAX, ..Default::default() };
-        let (mut mean, mut error_squared) = (0.0, 0.0);
+        let (mut mean, mut error) = (0.0, 0.0);
         for pixel in &self.tile.pixels {
             totals.samples += pixel.count as u64;
             totals.not_finite += pixel.not_finite as u64;
@@ -348,10 +360,9 @@ impl Film {
             totals.min_count = totals.min_count.min(pixel.count);
             totals.max_count = totals.max_count.max(pixel.count);
             mean += pixel.mean().iter().sum::<f64>();
-            error_squared += pixel.variance().iter().filter(|v| v.is_finite()).sum::<f64>() / pixel.count.max(1) as f64;
+            let known = pixel.variance().into_iter().filter(|v| v.is_finite());
+            error += known.map(|v| (v / pixel.count.max(1) as f64).sqrt()).sum::<f64>();
         }
-        let n = 3.0 * self.tile.pixels.len().max(1) as f64;
-        let (mean, error) = (mean / n, (error_squared / n).sqrt());
         totals.relative_error = if mean > 0.0 { error / mean } else { 0.0 };
         totals.min_count = totals.min_count.min(totals.max_count);
         totals

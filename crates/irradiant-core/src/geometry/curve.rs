@@ -15,6 +15,9 @@ use irradiant_scene::desc::shape::{CurveData, CurveStyle};
 /// Halvings below a piece at most.
 const MAX_DEPTH: i32 = 10;
 
+/// Fraction bits of sqrt(2): where the nearest power of two changes.
+const SQRT_2_MANTISSA: u32 = std::f32::consts::SQRT_2.to_bits() & 0x7f_ffff;
+
 type Control = [Point3; 4];
 
 #[derive(Clone, Debug)]
@@ -168,8 +171,7 @@ impl Curve {
         let tolerance = segment.width[0].max(segment.width[1]) * 0.05;
         let depth = if bend > 0.0 && tolerance > 0.0 {
             let ratio = std::f32::consts::SQRT_2 * 6.0 * bend / (8.0 * tolerance);
-            // floor(log2) from the exponent, halved: log base 4.
-            (((ratio.to_bits() >> 23) as i32 - 127) / 2).clamp(0, MAX_DEPTH)
+            halvings(ratio)
         } else {
             0
         };
@@ -358,6 +360,15 @@ impl Search<'_> {
     }
 }
 
+/// Halvings that make a curve straight whose bend is `ratio` tolerances: log base 4, from the nearest whole log base 2
+/// (pbrt-v4's `Log2Int` rounds to nearest, not down; the picture at sharp bends depends on it).
+#[inline]
+fn halvings(ratio: f32) -> i32 {
+    let bits = ratio.to_bits();
+    let nearest_log2 = (bits >> 23) as i32 - 127 + i32::from(bits & 0x7f_ffff >= SQRT_2_MANTISSA);
+    (nearest_log2 / 2).clamp(0, MAX_DEPTH)
+}
+
 /// Whether the box of the control points, grown, can hold a point of the z axis between 0 and `reach`.
 #[inline]
 fn overlaps(c: &Control, grow: f32, reach: f32) -> bool {
@@ -405,5 +416,21 @@ fn angle_between(a: Vec3, b: Vec3) -> f32 {
         std::f32::consts::PI - 2.0 * elementary::safe_asin(0.5 * (a + b).length())
     } else {
         2.0 * elementary::safe_asin(0.5 * (b - a).length())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// pbrt-v4's `Log2Int` rounds to nearest: a bend of 1.5 octaves is halved once, not never.
+    #[test]
+    fn halvings_are_half_of_the_nearest_octave() {
+        let cases =
+            [(0.3, 0), (1.0, 0), (2.8, 0), (2.9, 1), (4.0, 1), (11.3, 1), (11.4, 2), (45.3, 3), (1e20, MAX_DEPTH)];
+        for (ratio, expected) in cases {
+            assert_eq!(halvings(ratio), expected, "ratio {ratio}");
+        }
+        assert_eq!(halvings(f32::INFINITY), MAX_DEPTH);
     }
 }

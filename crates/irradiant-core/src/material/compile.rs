@@ -13,13 +13,30 @@ use irradiant_scene::desc::{
 };
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{ColorSpace, Role, Spectrum};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Lossless coats that are made where the roughness of a glossy paint varies.
 const PAINT_LEVELS: u32 = 17;
 
 /// Parameters of a coat, bit by bit.
-type CoatKey = (u32, u32, u32, u32, bool);
+type CoatKey = (u32, [u32; 2], u32, bool);
+
+/// A coat to be tabulated: tables take milliseconds each, so they are made side by side at the end.
+#[derive(Clone, Copy, Debug)]
+enum CoatPlan {
+    Clear { eta: f32, facets: Ggx, thickness: f32, weights: CoatWeights },
+    Lossless { eta: f32, alpha: f32 },
+}
+
+impl CoatPlan {
+    fn make(&self) -> Coat {
+        match *self {
+            Self::Clear { eta, facets, thickness, weights } => Coat::new(eta, facets, thickness, weights),
+            Self::Lossless { eta, alpha } => Coat::lossless(eta, alpha),
+        }
+    }
+}
 
 struct Compiler<'a> {
     desc: &'a SceneDesc,
@@ -27,7 +44,7 @@ struct Compiler<'a> {
     assets: &'a dyn Assets,
     space: &'static ColorSpace,
     diagnostics: &'a mut Diagnostics,
-    coats: Vec<Coat>,
+    coats: Vec<CoatPlan>,
     coat_ids: BTreeMap<CoatKey, u32>,
     normal_maps: Vec<NormalMap>,
     normal_map_ids: BTreeMap<std::path::PathBuf, Option<u32>>,
@@ -61,8 +78,9 @@ impl Materials {
         let mut entries: Vec<Entry> =
             desc.materials.iter().map(|m| Entry { material: c.material(&m.kind), relief: c.relief(m) }).collect();
         c.check_mixes(&mut entries);
-        let (coats, normal_maps) = (c.coats, c.normal_maps);
-        let (coat_depth_limit, pbrt_coat_weights) = (c.coat_depth_limit, c.pbrt_coat_weights);
+        let (normal_maps, coat_depth_limit) = (c.normal_maps, c.coat_depth_limit);
+        let coats: Vec<Coat> = c.coats.par_iter().map(CoatPlan::make).collect();
+        let pbrt_coat_weights = c.pbrt_coat_weights || coats.iter().any(Coat::has_pbrt_weights);
         let names = desc.materials.iter().map(|m| m.name.clone().unwrap_or_else(|| kind_name(&m.kind).into()));
         Self {
             names: names.collect(),
@@ -204,10 +222,8 @@ impl Compiler<'_> {
             let [x, y] = ggx.alphas();
             // Anisotropic coats are not tabulated, but copying one is no slower than making it.
             let exact = weights == CoatWeights::Exact;
-            let key = (eta.to_bits(), x.to_bits(), y.to_bits(), thickness.to_bits(), exact);
-            let id = self.tabulated(key, || Coat::new(eta, ggx, thickness, weights));
-            self.pbrt_coat_weights |= self.coats[id as usize].has_pbrt_weights();
-            tabulated = Some(id);
+            let key = (eta.to_bits(), [x.to_bits(), y.to_bits()], thickness.to_bits(), exact);
+            tabulated = Some(self.tabulated(key, CoatPlan::Clear { eta, facets: ggx, thickness, weights }));
         } else if weights == CoatWeights::Pbrt {
             // Walks use the weights where a rough coat lies over anything that is not a mirror.
             let smooth = |facets: Facets| matches!(facets, Facets::Constant(ggx) if ggx.is_smooth());
@@ -217,12 +233,12 @@ impl Compiler<'_> {
         CoatValue { tabulated, eta, facets, thickness, filling, limits }
     }
 
-    fn tabulated(&mut self, key: CoatKey, make: impl FnOnce() -> Coat) -> u32 {
+    fn tabulated(&mut self, key: CoatKey, plan: CoatPlan) -> u32 {
         if let Some(&id) = self.coat_ids.get(&key) {
             return id;
         }
         let id = self.coats.len() as u32;
-        self.coats.push(make());
+        self.coats.push(plan);
         self.coat_ids.insert(key, id);
         id
     }
@@ -244,12 +260,13 @@ impl Compiler<'_> {
                 if !(scale.value.is_finite() && scale.value >= 0.0) {
                     self.error("E0707", format!("scale is {}; it must be at least 0", scale.value), scale.span);
                 }
-                let most =
-                    [r, t].iter().filter_map(|v| Some(self.textures.constant_spectrum(*v)?.max_value())).sum::<f32>();
-                if most * scale.value > 1.001 {
-                    let sum = most * scale.value;
+                let shares = [r, t].map(|v| self.textures.constant_spectrum(v));
+                let sum_at =
+                    |l: f32| shares.iter().flatten().map(|s| (s.eval(l) * scale.value).clamp(0.0, 1.0)).sum::<f32>();
+                let most = (360..=830).map(|l| sum_at(l as f32)).fold(0.0, f32::max);
+                if most > 1.001 {
                     let message =
-                        format!("reflectance and transmittance add up to {sum:.3}: the surface creates light");
+                        format!("reflectance and transmittance add up to {most:.3}: the surface creates light");
                     self.warning("W0707", message, reflectance.span);
                 }
                 Material::DiffuseTransmission { reflectance: r, transmittance: t, scale: scale.value }
@@ -352,13 +369,12 @@ impl Compiler<'_> {
         };
         // Paints of the same index that vary share their levels.
         let count = alphas.len() as u32;
-        let alpha = if count == 1 { alphas[0].to_bits() } else { u32::MAX };
-        // No coat has a thickness of these bits, which are not a number.
-        let key = (index.to_bits(), alpha, alpha, u32::MAX, true);
+        let level = if count == 1 { alphas[0].to_bits() } else { u32::MAX };
+        let key = (index.to_bits(), [level, count], u32::MAX, true);
         let coats = &mut self.coats;
         let first = *self.coat_ids.entry(key).or_insert_with(|| {
             let first = coats.len() as u32;
-            coats.extend(alphas.into_iter().map(|alpha| Coat::lossless(index, alpha)));
+            coats.extend(alphas.into_iter().map(|alpha| CoatPlan::Lossless { eta: index, alpha }));
             first
         });
         Material::GlossyPaint { reflectance, coats: Coats { first, count }, facets }

@@ -307,8 +307,13 @@ fn bumps_bend_the_normal_as_the_height_field_does() {
 #[test]
 fn normal_maps_turn_the_normal_in_its_frame() {
     let n = Vec3::new(0.3, -0.2, 0.9).normalize();
-    let image = Image::from_fn(2, 2, ["R", "G", "B"], |x, _| {
-        let n = if x == 0 { n } else { Vec3::Z };
+    // Bent at the left; at the right bent the other way in the upper half of the picture, which v near 1 shows.
+    let image = Image::from_fn(2, 4, ["R", "G", "B"], |x, y| {
+        let n = match (x, y) {
+            (0, _) => n,
+            (_, 0) => Vec3::new(-n.x, -n.y, n.z),
+            _ => Vec3::Z,
+        };
         [n.x, n.y, n.z].map(|c| 0.5 * c + 0.5)
     });
     let assets = MemoryAssets::default().with("n.exr", write(&image, FileFormat::Exr).unwrap());
@@ -324,6 +329,9 @@ fn normal_maps_turn_the_normal_in_its_frame() {
         let frame = bsdf_at(&t, &m, 0, &at, &mut lambda()).unwrap().frame;
         assert!((frame.z - expected).length() < 1e-5, "{:?} {expected:?}", frame.z);
     }
+    at.uv = Point2::new(0.75, 0.875);
+    let frame = bsdf_at(&t, &m, 0, &at, &mut lambda()).unwrap().frame;
+    assert!((frame.z - Vec3::new(n.y, -n.x, n.z)).length() < 1e-5, "{:?}", frame.z);
     // Half way, the mean of the two, before it is scaled.
     at.uv = Point2::new(0.5, 0.4);
     let mean = (Vec3::new(-n.y, n.x, n.z) + Vec3::Z).normalize();

@@ -23,8 +23,6 @@ use std::sync::Arc;
 pub struct CameraDraws {
     /// Where in the pixel filter.
     pub film: Point2,
-    /// Where on the lens.
-    pub lens: Point2,
     /// When in the shutter.
     pub time: f32,
     /// Which wavelengths.
@@ -175,9 +173,15 @@ impl SampleStream<'_> {
     /// The camera's numbers.
     #[inline]
     pub fn camera(&self) -> CameraDraws {
-        let [fx, fy, lx, ly] = self.block(0);
-        let [time, wavelength, _, _] = self.block(1);
-        CameraDraws { film: Point2::new(fx, fy), lens: Point2::new(lx, ly), time, wavelength }
+        let [x, y, wavelength, time] = self.block(0);
+        CameraDraws { film: Point2::new(x, y), time, wavelength }
+    }
+
+    /// Where on the lens; for cameras that have one.
+    #[inline]
+    pub fn lens(&self) -> Point2 {
+        let [x, y, _, _] = self.block(1);
+        Point2::new(x, y)
     }
 
     /// Numbers for light sampling at the vertex after `depth` scattering events.

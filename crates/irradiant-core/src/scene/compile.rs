@@ -2,8 +2,8 @@
 
 use super::{Facts, LayerPlan, Scene};
 use crate::camera::{self, CompiledCamera};
-use crate::film::PixelBounds;
 use crate::film::filter::Filter;
+use crate::film::{Film, PixelBounds};
 use crate::geometry::{Geometry, compile_geometry};
 use crate::interaction::MaterialId;
 use crate::light::{LightContext, Lights};
@@ -12,7 +12,7 @@ use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
 use irradiant_image::{Image, ReadOptions};
-use irradiant_scene::desc::{CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilterKind, SceneDesc};
+use irradiant_scene::desc::{CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilmKind, FilterKind, SceneDesc};
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
 use std::sync::Arc;
@@ -30,11 +30,25 @@ pub struct CompileOptions {
     pub samples_per_pixel: Option<u32>,
     /// Seed.
     pub seed: Option<u64>,
+    /// Films that would take more memory than this, bytes, are refused before anything is reserved.
+    pub max_film_bytes: u64,
+}
+
+impl CompileOptions {
+    /// The default of [`Self::max_film_bytes`], 4 GiB: an 8K picture fits.
+    pub const MAX_FILM_BYTES: u64 = 4 << 30;
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { basis: Basis::Spectral, resolution: None, crop: None, samples_per_pixel: None, seed: None }
+        Self {
+            basis: Basis::Spectral,
+            resolution: None,
+            crop: None,
+            samples_per_pixel: None,
+            seed: None,
+            max_film_bytes: Self::MAX_FILM_BYTES,
+        }
     }
 }
 
@@ -74,8 +88,9 @@ fn compile(
     if options.crop.is_some() {
         (film.crop_window, film.pixel_bounds) = (options.crop.map(Spanned::unplaced), None);
     }
-    let bounds = pixel_bounds(&film, diagnostics);
+    let bounds = pixel_bounds(&film, diagnostics).filter(|b| fits(b, &film, options.max_film_bytes, diagnostics));
     check_filter(desc, diagnostics);
+    check_buckets(&film, diagnostics);
     let samples_per_pixel = options.samples_per_pixel.unwrap_or(desc.sampler.samples_per_pixel.value).max(1);
     let seed = options.seed.or(desc.sampler.seed).unwrap_or(desc.options.seed);
     let space = color_space(film.color_space);
@@ -99,18 +114,23 @@ fn compile(
     }
 
     let (Some(camera), Some(bounds), Some(sensor)) = (camera, bounds, sensor) else { return None };
+    if diagnostics.has_errors() {
+        return None;
+    }
     let CompiledCamera { camera, camera_from_world, footprint, .. } = camera;
     let light_sampler = LightSampler::new(desc.integrator.light_sampler, &lights);
-    let layers =
-        LayerPlan::new(&film, &camera_from_world.compose(&render_from_world.inverse()), &render_from_world.inverse());
+    let world_from_render = render_from_world.inverse();
+    let camera_from_render = camera_from_world.compose(&world_from_render);
+    let layers = LayerPlan::new(&film, space, options.basis, &camera_from_render, &world_from_render);
     let rgb_from_sensor = sensor.output_rgb_from_sensor_rgb(space, options.basis);
     let white = Spectrum::rgb([1.0; 3], Role::Illuminant, space);
     let white = white.scaled(1.0 / irradiant_spectrum::spectrum_to_photometric(&white));
     let filtered = !desc.options.disable_texture_filtering && textures.needs_footprint();
     let facts = facts(desc, &geometry, &materials, &textures, &lights);
-    let mut limits: Vec<String> = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    let truncations = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
+    let mut biases = Vec::new();
     if film.max_component_value.is_finite() {
-        limits.push(format!("maxcomponentvalue {} (biased)", film.max_component_value.value));
+        biases.push(format!("maxcomponentvalue {}", film.max_component_value.value));
     }
 
     Some(Scene {
@@ -138,7 +158,8 @@ fn compile(
         camera_from_world,
         pixel_jitter: !desc.options.disable_pixel_jitter,
         wavelength_jitter: !desc.options.disable_wavelength_jitter,
-        limits,
+        truncations,
+        biases,
         facts,
     })
 }
@@ -178,6 +199,25 @@ fn pixel_bounds(film: &FilmDesc, diagnostics: &mut Diagnostics) -> Option<PixelB
     Some(bounds)
 }
 
+/// Complains of a film that is too large for the memory it may take; says what to do.
+fn fits(bounds: &PixelBounds, film: &FilmDesc, limit: u64, diagnostics: &mut Diagnostics) -> bool {
+    let bytes = (bounds.area() as u64).saturating_mul(Film::bytes_per_pixel(LayerPlan::channels_of(film)));
+    if bytes > limit {
+        let gib = |bytes: u64| bytes as f64 / (1u64 << 30) as f64;
+        let [width, height] = [bounds.width(), bounds.height()];
+        let message = format!(
+            "a film of {width} x {height} pixels takes {:.1} GiB of memory; {:.1} are allowed",
+            gib(bytes),
+            gib(limit)
+        );
+        diagnostics.push(
+            Diagnostic::error("E0907", message, film.resolution.span)
+                .help("render it in parts with \"cropwindow\" (or --crop), or make it smaller (--resolution)"),
+        );
+    }
+    bytes <= limit
+}
+
 fn check_filter(desc: &SceneDesc, diagnostics: &mut Diagnostics) {
     for radius in [desc.filter.x_radius, desc.filter.y_radius] {
         if !(radius.value > 0.0 && radius.value <= 1e4) {
@@ -196,6 +236,25 @@ fn check_filter(desc: &SceneDesc, diagnostics: &mut Diagnostics) {
         diagnostics.push(
             Diagnostic::error("E0904", format!("{} is out of range", value.value), value.span)
                 .help("must be more than 0"),
+        );
+    }
+}
+
+/// Buckets of a spectral film: narrower ones than this could not be told apart by their names.
+const NARROWEST_BUCKET: f32 = 0.01;
+
+fn check_buckets(film: &FilmDesc, diagnostics: &mut Diagnostics) {
+    let FilmKind::Spectral { n_buckets, lambda_min, lambda_max } = &film.kind else { return };
+    let (lo, hi) = (lambda_min.value, lambda_max.value);
+    if !(lo >= 1.0 && lo < hi && hi <= 1e5) {
+        diagnostics.push(
+            Diagnostic::error("E0908", format!("a spectral film from {lo} to {hi} nm"), film.span)
+                .help("\"lambdamin\" is less than \"lambdamax\"; both are wavelengths in nm, 1 to 100000"),
+        );
+    } else if !((hi - lo) / n_buckets.value as f32 >= NARROWEST_BUCKET) {
+        diagnostics.push(
+            Diagnostic::error("E0908", format!("{} buckets from {lo} to {hi} nm", n_buckets.value), film.span)
+                .help(format!("a bucket is at least {NARROWEST_BUCKET} nm wide")),
         );
     }
 }

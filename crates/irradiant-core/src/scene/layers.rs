@@ -7,7 +7,7 @@ use crate::film::Layer;
 use crate::interaction::{Interaction, TextureContext};
 use irradiant_math::{Affine, Transform};
 use irradiant_scene::desc::{FilmDesc, FilmKind};
-use irradiant_spectrum::{LAMBDA_MAX, LAMBDA_MIN, SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, ColorSpace, LAMBDA_MAX, LAMBDA_MIN, SampledSpectrum, Sensor, Wavelengths};
 
 /// The layers of one film.
 #[derive(Clone, Debug)]
@@ -17,6 +17,9 @@ pub struct LayerPlan {
     has_geometry: bool,
     /// Geometry layers' space from render space.
     space_from_render: Affine,
+    /// Reflectance is shown by it, whatever the film's sensor.
+    observer: Sensor,
+    rgb_from_observer: [[f32; 3]; 3],
     first_bucket: usize,
     n_buckets: usize,
     lambda_range: [f32; 2],
@@ -25,11 +28,18 @@ pub struct LayerPlan {
 }
 
 impl LayerPlan {
-    /// For a film. `camera_from_render` and `world_from_render` are at shutter opening.
-    pub fn new(film: &FilmDesc, camera_from_render: &Transform, world_from_render: &Transform) -> Self {
+    /// For a film whose RGB is that of `space`, in a render in `basis`. `camera_from_render` and `world_from_render` are
+    /// at shutter opening.
+    pub fn new(
+        film: &FilmDesc,
+        space: &'static ColorSpace,
+        basis: Basis,
+        camera_from_render: &Transform,
+        world_from_render: &Transform,
+    ) -> Self {
         let mut layers = Vec::new();
         let mut lambda_range = [LAMBDA_MIN, LAMBDA_MAX];
-        let mut space = world_from_render;
+        let mut from_render = world_from_render;
         match &film.kind {
             FilmKind::Rgb => {}
             FilmKind::Gbuffer { camera_space } => {
@@ -40,9 +50,10 @@ impl LayerPlan {
                     Layer::Normal,
                     Layer::ShadingNormal,
                     Layer::Uv,
+                    Layer::Hits,
                 ];
                 if *camera_space {
-                    space = camera_from_render;
+                    from_render = camera_from_render;
                 }
             }
             FilmKind::Spectral { n_buckets, lambda_min, lambda_max } => {
@@ -56,15 +67,28 @@ impl LayerPlan {
         }
         let n_buckets = layers.iter().filter(|l| matches!(l, Layer::Bucket { .. })).count();
         let channels = layers.iter().map(Layer::n_channels).sum();
+        debug_assert_eq!(channels as u64, Self::channels_of(film));
+        let observer = Sensor::cie1931();
         Self {
+            rgb_from_observer: observer.output_rgb_from_sensor_rgb(space, basis),
+            observer,
             has_geometry: layers.len() > n_buckets,
             first_bucket: channels - n_buckets,
             layers,
             channels,
-            space_from_render: Affine::from_transform(space).unwrap_or_default(),
+            space_from_render: Affine::from_transform(from_render).unwrap_or_default(),
             n_buckets,
             lambda_range,
             variance: matches!(film.kind, FilmKind::Gbuffer { .. }),
+        }
+    }
+
+    /// Number of channels that the layers of a film will have, without making them: what it says may be absurd.
+    pub fn channels_of(film: &FilmDesc) -> u64 {
+        match &film.kind {
+            FilmKind::Rgb => 0,
+            FilmKind::Gbuffer { .. } => 17,
+            FilmKind::Spectral { n_buckets, .. } => n_buckets.value as u64,
         }
     }
 
@@ -102,8 +126,11 @@ impl LayerPlan {
         if !self.has_geometry {
             return;
         }
-        // Reflectance as the film would show it under white light.
-        let albedo = scene.film_rgb(bsdf.rho_hd(at.wo, 16) * scene.white(lambda), lambda);
+        // Reflectance in the film's colours under its white, as the standard observer sees it: not the film's sensor,
+        // exposure or limit (as pbrt-v4's `GBufferFilm::AddSample`).
+        let seen = self.observer.to_rgb(bsdf.rho_hd(at.wo, 16) * scene.white(lambda), lambda);
+        let m = &self.rgb_from_observer;
+        let albedo: [f32; 3] = std::array::from_fn(|i| m[i][0] * seen[0] + m[i][1] * seen[1] + m[i][2] * seen[2]);
         let space = &self.space_from_render;
         let p = space.point(at.p);
         let slope = camera_ray.depth_slope(at, space);
@@ -126,6 +153,7 @@ impl LayerPlan {
             ns.z,
             footprint.uv.x,
             footprint.uv.y,
+            1.0,
         ];
         values[..all.len()].copy_from_slice(&all);
     }
@@ -134,7 +162,7 @@ impl LayerPlan {
     /// radiance over its interval, W m^-2 sr^-1 nm^-1.
     #[inline]
     pub fn add_buckets(&self, radiance: SampledSpectrum, lambda: &Wavelengths, values: &mut [f32]) {
-        if self.n_buckets == 0 || lambda.basis == irradiant_spectrum::Basis::Rgb {
+        if self.n_buckets == 0 || lambda.basis == Basis::Rgb {
             return;
         }
         let [lo, hi] = self.lambda_range;

@@ -62,7 +62,8 @@ pub struct Scene {
     camera_from_world: Transform,
     pixel_jitter: bool,
     wavelength_jitter: bool,
-    limits: Vec<String>,
+    truncations: Vec<String>,
+    biases: Vec<String>,
     facts: Facts,
 }
 
@@ -79,6 +80,11 @@ impl Scene {
     /// An empty film for this scene.
     pub fn new_film(&self) -> Film {
         Film::new(self.resolution, self.bounds, self.layers.layers().to_vec())
+    }
+
+    /// The pixels that are rendered.
+    pub fn bounds(&self) -> PixelBounds {
+        self.bounds
     }
 
     /// The alpha test for rays.
@@ -164,9 +170,14 @@ impl Scene {
         std::array::from_fn(|i| self.camera_from_world.m[i % 4][i / 4] as f32)
     }
 
-    /// Limits and biases that the scene itself asks for, for the header.
-    pub fn limits(&self) -> Vec<String> {
-        self.limits.clone()
+    /// What the scene itself leaves out, by its models' own limits; for the header.
+    pub fn truncations(&self) -> &[String] {
+        &self.truncations
+    }
+
+    /// What biases the picture because the scene asks for it; for the header.
+    pub fn biases(&self) -> &[String] {
+        &self.biases
     }
 
     /// Counts, for `check`.

@@ -3,6 +3,7 @@
 //! An image is decoded once per (file, filter, wrap, encoding), several at a time; 8-bit images stay 8-bit in memory.
 //! Values are pbrt-v4's: the lookup is scaled, then inverted if asked, then kept from going below 0. As in pbrt-v4, the
 //! colour space is the one that the file states (by its chromaticities) or sRGB, whatever the scene's directives say.
+//! Unlike pbrt-v4, which decodes JPEG and TGA as sRGB always, a stated `encoding` counts for every 8-bit format.
 
 use super::mapping::Coordinates;
 use irradiant_image::{Encoding, Image, MipFilter, MipMap, MipOptions, ReadOptions, WrapMode};

@@ -142,6 +142,14 @@ mod tests {
 
     #[test]
     fn blurred_boards_are_grey() {
+        // A tent of half-width 1.5 x 0.1 at 0.05 from an edge: (1 - 0.05/0.15)^2 / 2 of it lie beyond.
+        assert!((checkerboard(&at(0.95, 0.5, 0.1)) - 2.0 / 9.0).abs() < 1e-5);
+        let c = SolidCoordinates {
+            p: Point3::new(0.5, 0.95, 0.5),
+            dpdx: Vec3::new(0.02, -0.03, 0.0),
+            dpdy: Vec3::new(0.0, 0.1, 0.01),
+        };
+        assert!((solid_checkerboard(&c) - 2.0 / 9.0).abs() < 1e-5);
         assert!((checkerboard(&at(0.3, 0.7, 500.0)) - 0.5).abs() < 1e-4);
         let wide =
             SolidCoordinates { p: Point3::new(0.1, 0.2, 0.3), dpdx: Vec3::new(300.0, 300.0, 300.0), dpdy: Vec3::ZERO };

@@ -268,8 +268,15 @@ fn encodings_are_honoured() {
 fn colours_of_images_become_spectra_by_their_role() {
     let mut bright = image_map("c.png", ImageFilter::Point);
     bright.scale = 4.0;
+    // The second is the same by a texture that scales a half as bright one: before it is clamped, as in pbrt-v4.
+    let half = ImageMapDesc { scale: 2.0, ..bright.clone() };
+    let kinds = [
+        BasicTexture::ImageMap(bright),
+        BasicTexture::Scale { tex: spectrum_ref(2), scale: value(2.0) },
+        BasicTexture::ImageMap(half),
+    ];
     let desc = SceneDesc {
-        spectrum_textures: vec![texture(SpectrumTextureKind::Basic(BasicTexture::ImageMap(bright)))],
+        spectrum_textures: kinds.map(|k| texture(SpectrumTextureKind::Basic(k))).into(),
         ..SceneDesc::default()
     };
     let (mut t, diagnostics) = compile_with(&desc, &colour_png());
@@ -284,6 +291,8 @@ fn colours_of_images_become_spectra_by_their_role() {
         let id = spectrum(&mut t, &desc, 0, role);
         let got = t.spectrum(id, &here, &lambda());
         assert!((0..4).all(|i| (got[i] - expected[i]).abs() < 1e-4), "{role:?}: {got:?} {expected:?}");
+        let scaled = spectrum(&mut t, &desc, 1, role);
+        assert_eq!(t.spectrum(scaled, &here, &lambda()), got);
         let lanes = t.spectrum(id, &here, &Wavelengths::rgb());
         let most = if role == Role::Reflectance { 1.0 } else { 4.0 };
         assert!((0..3).all(|i| (lanes[i] - rgb[i].min(most)).abs() < 1e-5), "{lanes:?} {rgb:?}");
