@@ -32,7 +32,7 @@ pub enum Alpha {
 pub(crate) struct ShapeInfo {
     pub material: MaterialId,
     pub alpha: Alpha,
-    /// Index of the emitter of its first face, or [`NO_EMITTER`].
+    /// Index among faces that emit of its first one, or [`NO_EMITTER`].
     pub first_emitter: u32,
 }
 

@@ -47,6 +47,8 @@ pub struct LightContext<'a> {
 /// A surface that emits.
 pub(super) struct AreaEmitter {
     pub shape: EmitterShape,
+    /// Number of the author's faces that it is made of.
+    pub faces: u32,
     pub desc: Arc<AreaLightDesc>,
     pub alpha: AreaAlpha,
 }
@@ -94,7 +96,12 @@ impl Lights {
                     return None;
                 }
                 let alpha = area_alpha(desc, emitter.alpha);
-                Some(AreaEmitter { shape: emitter.geometry.clone(), desc: area_light.clone(), alpha })
+                Some(AreaEmitter {
+                    shape: emitter.geometry.clone(),
+                    faces: emitter.faces,
+                    desc: area_light.clone(),
+                    alpha,
+                })
             })
             .collect();
         for span in ignored {
@@ -492,12 +499,12 @@ impl Compiler<'_, '_> {
         let ids = emitters
             .into_iter()
             .map(|emitter| {
-                let AreaEmitter { shape, desc, alpha } = emitter?;
+                let AreaEmitter { shape, faces, desc, alpha } = emitter?;
                 let part = known.entry(Arc::as_ptr(&desc)).or_insert_with(|| self.area_part(&desc)).as_ref()?;
                 let two_sided = desc.two_sided;
                 let scale = part.power.map_or(1.0, |phi| {
                     let sides = if two_sided { 2.0 } else { 1.0 };
-                    let luminous = part.luminance * sides * shape.area() * PI;
+                    let luminous = part.luminance * sides * (shape.area() / faces as f32) * PI;
                     if luminous > 0.0 { phi / luminous } else { 0.0 }
                 });
                 list.push(Light::Area(AreaLight { shape, radiance: part.radiance.clone(), scale, two_sided, alpha }));
