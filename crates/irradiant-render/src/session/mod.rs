@@ -96,7 +96,7 @@ impl Session {
             cancelled: AtomicBool::new(false),
             samples_done: AtomicU64::new(0),
             started,
-            deadline: settings.time_limit.map(|limit| started + limit),
+            deadline: settings.time_limit.and_then(|limit| started.checked_add(limit)),
             film: Mutex::new(film),
             stats: Mutex::new(RenderStats::default()),
         });
@@ -147,7 +147,7 @@ impl Session {
         for worker in self.workers.drain(..) {
             worker_panicked |= worker.join().is_err();
         }
-        // Taken, not copied: a film can be gigabytes. Nobody looks at it after this.
+        // Taken, not copied: films are big.
         let nothing = Film::new([0, 0], PixelBounds { x0: 0, y0: 0, x1: 0, y1: 0 }, Vec::new());
         let film = std::mem::replace(&mut *lock(&self.shared.film), nothing);
         let stats = lock(&self.shared.stats).clone();
