@@ -177,18 +177,7 @@ impl Scene {
             LightTarget::Point(p) => (p, Normal3::ZERO),
             LightTarget::Infinite => (Point3::ZERO, Normal3::ZERO),
         };
-        let at = TextureContext {
-            p,
-            n,
-            uv: alpha.uv,
-            dpdx: Vec3::ZERO,
-            dpdy: Vec3::ZERO,
-            dudx: 0.0,
-            dudy: 0.0,
-            dvdx: 0.0,
-            dvdy: 0.0,
-            face: 0,
-        };
+        let at = TextureContext::without_footprint(p, n, alpha.uv, 0);
         // As rays see it: what is not more than 0 is not there.
         let value = self.alpha().alpha(alpha.texture, &at);
         if value > 0.0 { value.min(1.0) } else { 0.0 }
