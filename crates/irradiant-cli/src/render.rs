@@ -86,7 +86,7 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
         );
     }
 
-    let rendering = watch(&job, arguments.quiet)?;
+    let Watched { rendering, worker_panicked } = watch(&job, arguments.quiet);
     clock.lap("render");
     // One that cannot be written must not cost the others.
     let mut failed = None;
@@ -124,6 +124,9 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
             short_count(rendering.stats.paths as f64 / clock.seconds("render").max(1e-9))
         );
     }
+    if worker_panicked {
+        return Err(Error::Internal("a render thread stopped; the picture was written without its last tile".into()));
+    }
     Ok(())
 }
 
@@ -134,8 +137,15 @@ fn job_threads(arguments: &RenderArguments) -> usize {
     }
 }
 
+/// What rendering left.
+struct Watched {
+    rendering: Rendering,
+    /// A bug: the picture lacks what that worker had under way.
+    worker_panicked: bool,
+}
+
 /// Renders with progress; Ctrl-C ends early with the picture so far, a second one at once.
-fn watch(job: &Job, quiet: bool) -> Result<Rendering, Error> {
+fn watch(job: &Job, quiet: bool) -> Watched {
     let interrupts = Arc::new(AtomicU32::new(0));
     let counter = Arc::clone(&interrupts);
     // A handler that cannot be set (there is one already, in an embedding process) only means no early picture.
@@ -166,10 +176,7 @@ fn watch(job: &Job, quiet: bool) -> Result<Rendering, Error> {
     }
     reporter.finish();
     let finished = session.wait();
-    if finished.worker_panicked {
-        return Err(Error::Internal("a render thread stopped; please report the scene and the command".into()));
-    }
-    Ok(job.rendering(finished.film, finished.stats))
+    Watched { rendering: job.rendering(finished.film, finished.stats), worker_panicked: finished.worker_panicked }
 }
 
 /// Where to write: as asked for, else the scene's own name in the current directory, EXR and PNG.
