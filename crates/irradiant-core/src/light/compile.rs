@@ -370,8 +370,8 @@ impl Compiler<'_, '_> {
                 let (values, size): (Box<[f32]>, usize) = match file {
                     Some(file) => {
                         let image = self.square_image(file)?;
-                        let mean = |c: &[f32; 3]| (c[0] + c[1] + c[2]) * (1.0 / 3.0);
-                        (image.pixels().iter().map(mean).collect(), image.width())
+                        let mean = |c: [f32; 3]| (c[0] + c[1] + c[2]) * (1.0 / 3.0);
+                        (image.pixels().map(mean).collect(), image.width())
                     }
                     None => {
                         self.warning("W0810", "a goniometric light without \"filename\" is a point light", desc.span);
@@ -565,7 +565,7 @@ fn upper_illuminance(image: &RadianceImage) -> f32 {
     for y in 0..image.height() {
         for x in 0..image.width() {
             let w = warp::equal_area_square_to_sphere(image.center_of(x, y));
-            let rgb = image.pixels()[y * image.width() + x];
+            let rgb = image.pixel(x, y);
             sum += f64::from(image.space().luminance(rgb)) * f64::from(w.z.max(0.0));
         }
     }
