@@ -62,6 +62,15 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     }
 }
 
+/// Sine and cosine of `x` in [-pi/4, pi/4] (about), where nothing need be reduced: `f32` series, error 1 ulp of 1.
+#[inline(always)]
+pub(crate) fn sin_cos_octant(x: f32) -> (f32, f32) {
+    let z = x * x;
+    let s = x + x * z * (-0.166_666_67 + z * (0.008_333_328 + z * (-0.000_198_392 + z * 2.717_338e-6)));
+    let c = 1.0 - z * (0.5 - z * (0.041_666_667 - z * (0.001_388_888 - z * 2.479_893e-5)));
+    (s, c)
+}
+
 /// Sine of `x` radians. NaN for infinite or NaN `x`.
 #[inline]
 pub fn sin(x: f32) -> f32 {

@@ -86,11 +86,13 @@ impl Coat {
                 coat.weights = CoatWeights::Exact;
             }
             let points = if alpha < 0.02 { 1024 } else { 4096 };
-            coat.enter = tabulate(|mu| coat.transmission(mu, points, CoatWeights::Exact));
-            coat.exit = match coat.weights {
-                CoatWeights::Exact => coat.enter,
-                CoatWeights::Pbrt => tabulate(|mu| coat.transmission(mu, points, CoatWeights::Pbrt)),
-            };
+            // Both kinds of weights from the same samples, which is what takes the time.
+            let mut at_nodes = [[0.0; 2]; NODES];
+            for (i, values) in at_nodes.iter_mut().enumerate().skip(1) {
+                *values = coat.transmission(node(i), points, coat.weights);
+            }
+            coat.enter = table(|i| at_nodes[i][0]);
+            coat.exit = table(|i| at_nodes[i][1]);
             coat.internal_reflectance = coat.rough_internal_reflectance();
         }
         coat
@@ -118,7 +120,7 @@ impl Coat {
     pub fn lossless(eta: f32, alpha: f32) -> Self {
         let mut coat = Self::walked(eta, Ggx::new(alpha, alpha), 0.0, CoatWeights::Exact);
         coat.form = CoatForm::Tabulated;
-        coat.enter = tabulate(|mu| (1.0 - coat.reflection(mu, 4096)) as f32);
+        coat.enter = table(|i| (1.0 - coat.reflection(node(i), 4096)) as f32);
         coat.exit = coat.enter;
         // mean(A) = int 2 mu A(mu) dmu over the interpolated table itself, so that the furnace closes on it.
         let n = 2000;
@@ -135,6 +137,11 @@ impl Coat {
     #[inline]
     pub fn interface(&self) -> &Dielectric {
         &self.interface
+    }
+
+    /// Whether evaluation deviates from the truth as pbrt-v4's does: rough, and [`CoatWeights::Pbrt`].
+    pub fn has_pbrt_weights(&self) -> bool {
+        self.weights == CoatWeights::Pbrt && !self.interface.is_specular()
     }
 
     /// A of the module's front: the fraction of light at this angle that reaches the base unscattered, times the squared
@@ -225,10 +232,10 @@ impl Coat {
         (sum / n as f64) as f32
     }
 
-    /// A of a rough coat at one angle, by a lattice over facets.
-    fn transmission(&self, mu: f32, points: usize, weights: CoatWeights) -> f32 {
+    /// A of a rough coat at one angle, by a lattice over facets: with right weights, and with these.
+    fn transmission(&self, mu: f32, points: usize, weights: CoatWeights) -> [f32; 2] {
         let w = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-        let mut sum = 0.0f64;
+        let mut sums = [0.0f64; 2];
         for i in 0..points {
             let u = lattice2(i, points);
             let Some(s) =
@@ -237,18 +244,22 @@ impl Coat {
                 continue;
             };
             let inside = s.wi.z.abs();
-            let mut value = f64::from(s.weight * exp(-self.thickness / inside));
-            if weights == CoatWeights::Pbrt {
-                // Its two weights: exit direction first, against the base's cosine density; and the other way around,
-                // but against the density of going out to w instead of that of coming in from it.
-                let power = |a: f64, b: f64| a * a / (a * a + b * b);
-                let base = f64::from(inside) / std::f64::consts::PI;
-                let outward = self.interface.f_and_pdf(s.wi, w, TransportMode::Radiance, Sides::Transmission).1;
-                value *= power(f64::from(s.pdf), base) + power(base, f64::from(outward));
-            }
-            sum += value;
+            let value = f64::from(s.weight * exp(-self.thickness / inside));
+            let factor = match weights {
+                CoatWeights::Exact => 1.0,
+                CoatWeights::Pbrt => {
+                    // Its two weights: exit direction first, against the base's cosine density; and the other way around,
+                    // but against the density of going out to w instead of that of coming in from it.
+                    let power = |a: f64, b: f64| a * a / (a * a + b * b);
+                    let base = f64::from(inside) / std::f64::consts::PI;
+                    let outward = self.interface.f_and_pdf(s.wi, w, TransportMode::Radiance, Sides::Transmission).1;
+                    power(f64::from(s.pdf), base) + power(base, f64::from(outward))
+                }
+            };
+            sums[0] += value;
+            sums[1] += value * factor;
         }
-        (sum / points as f64) as f32
+        sums.map(|sum| (sum / points as f64) as f32)
     }
 
     /// The coat's own albedo from outside at one angle.
@@ -293,14 +304,17 @@ fn lattice3(i: usize, n: usize) -> [f32; 3] {
     [x as f32, y as f32, z as f32]
 }
 
-/// `f(cos)` at the nodes, in fixed point.
-fn tabulate(f: impl Fn(f32) -> f32) -> Table {
+/// The cosine at node `i`.
+fn node(i: usize) -> f32 {
+    let s = i as f32 / (NODES - 1) as f32;
+    s * s
+}
+
+/// `value` of the nodes, in fixed point. The first is not asked for: at exactly grazing incidence nothing enters.
+fn table(value: impl Fn(usize) -> f32) -> Table {
     let mut table = [0; STORED];
-    let store = |v: f32| (v * SCALE + 0.5).clamp(0.0, 65_535.0) as u16;
-    for i in 0..NODES {
-        let s = i as f32 / (NODES - 1) as f32;
-        // At exactly grazing incidence nothing enters.
-        table[i + 1] = if i == 0 { 0 } else { store(f(s * s)) };
+    for i in 1..NODES {
+        table[i + 1] = (value(i) * SCALE + 0.5).clamp(0.0, 65_535.0) as u16;
     }
     // Even about 0; straight on beyond 1.
     table[0] = table[2];

@@ -32,7 +32,7 @@ pub enum Alpha {
 pub(crate) struct ShapeInfo {
     pub material: MaterialId,
     pub alpha: Alpha,
-    /// Index of the emitter of its first face, or [`NO_EMITTER`].
+    /// Index among faces that emit of its first one, or [`NO_EMITTER`].
     pub first_emitter: u32,
 }
 
@@ -161,18 +161,7 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
 }
 
 fn context(p: Point3, n: Vec3, uv: Point2, face: u32) -> TextureContext {
-    TextureContext {
-        p,
-        n: n.normalize().as_normal(),
-        uv,
-        dpdx: Vec3::ZERO,
-        dpdy: Vec3::ZERO,
-        dudx: 0.0,
-        dudy: 0.0,
-        dvdx: 0.0,
-        dvdy: 0.0,
-        face,
-    }
+    TextureContext::without_footprint(p, n.normalize().as_normal(), uv, face)
 }
 
 impl<A: AlphaTextures> GroupLeaves<'_, A> {

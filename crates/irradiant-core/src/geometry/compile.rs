@@ -5,7 +5,8 @@ use super::curve::Curve;
 use super::cylinder::Cylinder;
 use super::disk::Disk;
 use super::emitter::{
-    BilinearEmitter, CurveEmitter, CylinderEmitter, DiskEmitter, EmitterShape, SphereEmitter, TriangleEmitter,
+    BilinearEmitter, CurveEmitter, CylinderEmitter, DiskEmitter, EmitterShape, RectangleEmitter, SphereEmitter,
+    TriangleEmitter,
 };
 use super::instance::{Instance, Motion};
 use super::placement::Placement;
@@ -39,6 +40,7 @@ pub fn compile_geometry(
         shapes: Shapes::default(),
         groups: vec![None],
         emitters: Vec::new(),
+        face_emitters: Vec::new(),
         material: &material,
         materials: &desc.materials,
         diagnostics,
@@ -66,9 +68,10 @@ pub fn compile_geometry(
     }
     let top = c.group(scene);
     c.groups[0] = Some(top);
-    let Compiler { shapes, groups, emitters, .. } = c;
-    let lights = (0..emitters.len() as u32).map(|i| Some(LightId(i))).collect();
-    Geometry { level: bvh::Level::detect(), shapes, groups: groups.into_iter().flatten().collect(), emitters, lights }
+    let Compiler { shapes, groups, emitters, face_emitters, .. } = c;
+    let lights = face_emitters.iter().map(|&i| Some(LightId(i))).collect();
+    let groups = groups.into_iter().flatten().collect();
+    Geometry { level: bvh::Level::detect(), shapes, groups, emitters, face_emitters, lights }
 }
 
 /// What will stand in one tree.
@@ -90,6 +93,7 @@ struct Compiler<'a, F> {
     shapes: Shapes,
     groups: Vec<Option<Group>>,
     emitters: Vec<Emitter>,
+    face_emitters: Vec<u32>,
     material: &'a F,
     materials: &'a [MaterialDesc],
     diagnostics: &'a mut Diagnostics,
@@ -123,7 +127,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
         }
         let emits = emits && !moving && in_scene;
         if emits {
-            self.shapes.infos[id as usize].first_emitter = self.emitters.len() as u32;
+            self.shapes.infos[id as usize].first_emitter = self.face_emitters.len() as u32;
         }
         if !moving {
             let t = outer.compose(&desc.world_from_shape.start);
@@ -174,7 +178,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
                     return self.warning("W0503", "this sphere has no area: its z limits leave nothing", desc.span);
                 }
                 if emits {
-                    self.emitter(id, 0, EmitterShape::Sphere(Box::new(SphereEmitter::new(sphere.clone()))));
+                    self.emitter(id, 0, 1, EmitterShape::Sphere(Box::new(SphereEmitter::new(sphere.clone()))));
                 }
                 if there {
                     let user = User::Sphere { shape: id, sphere: self.shapes.spheres.len() as u32 };
@@ -193,7 +197,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
                 }
                 let disk = Disk::new(*height, radius.value, inner_radius.max(0.0), phi_max.value, place);
                 if emits {
-                    self.emitter(id, 0, EmitterShape::Disk(Box::new(DiskEmitter::new(disk.clone()))));
+                    self.emitter(id, 0, 1, EmitterShape::Disk(Box::new(DiskEmitter::new(disk.clone()))));
                 }
                 if there {
                     members.add(User::Disk { shape: id, disk: self.shapes.disks.len() as u32 }, disk.bounds());
@@ -211,7 +215,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
                 }
                 let cylinder = Cylinder::new(radius.value, *z_min, *z_max, phi_max.value, place);
                 if emits {
-                    self.emitter(id, 0, EmitterShape::Cylinder(Box::new(CylinderEmitter::new(cylinder.clone()))));
+                    self.emitter(id, 0, 1, EmitterShape::Cylinder(Box::new(CylinderEmitter::new(cylinder.clone()))));
                 }
                 if there {
                     let user = User::Cylinder { shape: id, cylinder: self.shapes.cylinders.len() as u32 };
@@ -292,18 +296,34 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
 
     fn mesh_emitters(&mut self, mesh: &Mesh, id: u32) {
         let has_normals = !mesh.normals.is_empty();
-        for (i, f) in mesh.triangles.iter().enumerate() {
-            let p = f.map(|v| mesh.position(v));
+        let triangle = |i: usize| {
+            let f = mesh.triangles[i];
             let normals = has_normals.then(|| f.map(|v| mesh.normal(v)));
-            let e = TriangleEmitter::new(p, mesh.triangle_uvs(i as u32), normals, mesh.flip);
-            self.emitter(id, i as u32, EmitterShape::Triangle(Box::new(e)));
+            TriangleEmitter::new(f.map(|v| mesh.position(v)), mesh.triangle_uvs(i as u32), normals, mesh.flip)
+        };
+        // An opacity texture may depend on the face, so there each face remains a light.
+        let may_join = !matches!(self.shapes.infos[id as usize].alpha, Alpha::Texture(_));
+        let mut i = 0;
+        while i < mesh.triangles.len() {
+            let e = triangle(i);
+            let next = (may_join && i + 1 < mesh.triangles.len()).then(|| triangle(i + 1));
+            match next.and_then(|next| RectangleEmitter::of_triangles(&e, &next)) {
+                Some(r) => {
+                    self.emitter(id, i as u32, 2, EmitterShape::Rectangle(Box::new(r)));
+                    i += 2;
+                }
+                None => {
+                    self.emitter(id, i as u32, 1, EmitterShape::Triangle(Box::new(e)));
+                    i += 1;
+                }
+            }
         }
         for (i, f) in mesh.quads.iter().enumerate() {
             let p = f.map(|v| mesh.position(v));
             let normals = has_normals.then(|| f.map(|v| mesh.normal(v)));
             let uvs = (!mesh.uvs.is_empty()).then(|| f.map(|v| mesh.uvs[v as usize]));
             let e = BilinearEmitter::new(p, uvs, normals, mesh.flip);
-            self.emitter(id, (mesh.triangles.len() + i) as u32, EmitterShape::Bilinear(Box::new(e)));
+            self.emitter(id, (mesh.triangles.len() + i) as u32, 1, EmitterShape::Bilinear(Box::new(e)));
         }
     }
 
@@ -342,7 +362,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
             let bounds = curve.piece_bounds(piece);
             if emits {
                 let e = CurveEmitter { bounds, area: curve.piece_area(piece) };
-                self.emitter(id, piece, EmitterShape::Curve(e));
+                self.emitter(id, piece, 1, EmitterShape::Curve(e));
             }
             if there {
                 members.add(User::Curve { shape: id, curve: index, piece }, bounds);
@@ -351,9 +371,10 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
         self.shapes.curves.push(curve);
     }
 
-    fn emitter(&mut self, id: u32, face: u32, geometry: EmitterShape) {
+    fn emitter(&mut self, id: u32, face: u32, faces: u32, geometry: EmitterShape) {
         let alpha = self.shapes.infos[id as usize].alpha;
-        self.emitters.push(Emitter { shape: ShapeId(id), face, alpha, geometry });
+        self.face_emitters.extend((0..faces).map(|_| self.emitters.len() as u32));
+        self.emitters.push(Emitter { shape: ShapeId(id), face, faces, alpha, geometry });
     }
 
     /// Adds an instance of a group to another.

@@ -82,6 +82,8 @@ pub struct Emitter {
     pub shape: ShapeId,
     /// Its face there: triangle, then quad, or piece of curve; 0 for quadrics.
     pub face: u32,
+    /// Number of faces: 2 where triangles `face` and `face + 1` are one rectangle, else 1.
+    pub faces: u32,
     /// Opacity of the shape.
     pub alpha: Alpha,
     /// Its form.
@@ -96,6 +98,8 @@ pub struct Geometry {
     /// The scene itself, then objects and moving shapes.
     pub(crate) groups: Vec<Group>,
     emitters: Vec<Emitter>,
+    /// The emitter of each face of each emitting shape, and its light.
+    face_emitters: Vec<u32>,
     lights: Vec<Option<LightId>>,
 }
 
@@ -227,9 +231,8 @@ impl Geometry {
     /// Says which light each emitter became; `None` for those that are no light after all. Until then emitter `i` is
     /// light `i`. A short list leaves the rest without light.
     pub fn assign_lights(&mut self, lights: impl IntoIterator<Item = Option<LightId>>) {
-        let mut lights: Vec<Option<LightId>> = lights.into_iter().collect();
-        lights.resize(self.emitters.len(), None);
-        self.lights = lights;
+        let by_emitter: Vec<Option<LightId>> = lights.into_iter().collect();
+        self.lights = self.face_emitters.iter().map(|&e| by_emitter.get(e as usize).copied().flatten()).collect();
     }
 
     /// A box around everything; empty for an empty scene.

@@ -189,7 +189,10 @@ impl Mesh {
         let mut n: Normal3 = single(normal).into();
         let inverse = 1.0 / determinant;
         let (mut dpdu, mut dpdv) = (Vec3::ZERO, Vec3::ZERO);
-        if has_uv {
+        if self.uvs.is_empty() {
+            // What the lines below say for the default coordinates.
+            (dpdu, dpdv) = (p1 - p0, p2 - p1);
+        } else if has_uv {
             dpdu = combine(d12[1], dp02, -d02[1], dp12) * inverse;
             dpdv = combine(d02[0], dp12, -d12[0], dp02) * inverse;
         }

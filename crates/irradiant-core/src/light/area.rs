@@ -63,7 +63,7 @@ pub enum AreaAlpha {
     Unseen,
 }
 
-/// One emitting triangle, patch or quadric.
+/// One emitting triangle, rectangle of two triangles, patch or quadric.
 #[derive(Clone, Debug)]
 pub struct AreaLight {
     /// Where.
@@ -100,6 +100,12 @@ impl AreaLight {
         }
     }
 
+    /// Whether what it emits depends on surface parameters.
+    #[inline]
+    fn wants_uv(&self) -> bool {
+        matches!(self.radiance, AreaRadiance::Image(_)) || matches!(self.alpha, AreaAlpha::Texture(_))
+    }
+
     /// Factor on what a sample at `uv` brings, and the texture that is still to be asked.
     #[inline]
     fn opacity(&self, uv: Point2) -> (f32, Option<AlphaAt>) {
@@ -113,7 +119,7 @@ impl AreaLight {
     /// See [`super::Light::sample`].
     #[inline]
     pub fn sample(&self, at: &ReferencePoint, u: Point2, lambda: &Wavelengths) -> Option<LightSample> {
-        let s = self.shape.sample(at, u)?;
+        let s = self.shape.sample(at, u, self.wants_uv())?;
         let offset = s.p - at.p;
         let distance_squared = offset.length_squared();
         if !(s.pdf > 0.0 && distance_squared > 0.0) {
@@ -178,7 +184,7 @@ impl AreaLight {
 
     /// See [`super::Light::emit`].
     pub fn emit(&self, u_position: Point2, u_direction: Point2, lambda: &Wavelengths, time: f32) -> Option<EmittedRay> {
-        let s = self.shape.sample_area(u_position)?;
+        let s = self.shape.sample_area(u_position, self.wants_uv())?;
         let mut u = u_direction;
         // Choose a side, then a cosine-weighted direction on it.
         let flip = self.two_sided && u.x >= 0.5;

@@ -47,6 +47,8 @@ pub struct LightContext<'a> {
 /// A surface that emits.
 pub(super) struct AreaEmitter {
     pub shape: EmitterShape,
+    /// Number of the author's faces that it is made of.
+    pub faces: u32,
     pub desc: Arc<AreaLightDesc>,
     pub alpha: AreaAlpha,
 }
@@ -94,7 +96,12 @@ impl Lights {
                     return None;
                 }
                 let alpha = area_alpha(desc, emitter.alpha);
-                Some(AreaEmitter { shape: emitter.geometry.clone(), desc: area_light.clone(), alpha })
+                Some(AreaEmitter {
+                    shape: emitter.geometry.clone(),
+                    faces: emitter.faces,
+                    desc: area_light.clone(),
+                    alpha,
+                })
             })
             .collect();
         for span in ignored {
@@ -363,8 +370,8 @@ impl Compiler<'_, '_> {
                 let (values, size): (Box<[f32]>, usize) = match file {
                     Some(file) => {
                         let image = self.square_image(file)?;
-                        let mean = |c: &[f32; 3]| (c[0] + c[1] + c[2]) * (1.0 / 3.0);
-                        (image.pixels().iter().map(mean).collect(), image.width())
+                        let mean = |c: [f32; 3]| (c[0] + c[1] + c[2]) * (1.0 / 3.0);
+                        (image.pixels().map(mean).collect(), image.width())
                     }
                     None => {
                         self.warning("W0810", "a goniometric light without \"filename\" is a point light", desc.span);
@@ -492,12 +499,12 @@ impl Compiler<'_, '_> {
         let ids = emitters
             .into_iter()
             .map(|emitter| {
-                let AreaEmitter { shape, desc, alpha } = emitter?;
+                let AreaEmitter { shape, faces, desc, alpha } = emitter?;
                 let part = known.entry(Arc::as_ptr(&desc)).or_insert_with(|| self.area_part(&desc)).as_ref()?;
                 let two_sided = desc.two_sided;
                 let scale = part.power.map_or(1.0, |phi| {
                     let sides = if two_sided { 2.0 } else { 1.0 };
-                    let luminous = part.luminance * sides * shape.area() * PI;
+                    let luminous = part.luminance * sides * (shape.area() / faces as f32) * PI;
                     if luminous > 0.0 { phi / luminous } else { 0.0 }
                 });
                 list.push(Light::Area(AreaLight { shape, radiance: part.radiance.clone(), scale, two_sided, alpha }));
@@ -558,7 +565,7 @@ fn upper_illuminance(image: &RadianceImage) -> f32 {
     for y in 0..image.height() {
         for x in 0..image.width() {
             let w = warp::equal_area_square_to_sphere(image.center_of(x, y));
-            let rgb = image.pixels()[y * image.width() + x];
+            let rgb = image.pixel(x, y);
             sum += f64::from(image.space().luminance(rgb)) * f64::from(w.z.max(0.0));
         }
     }

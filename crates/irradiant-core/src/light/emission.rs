@@ -72,10 +72,52 @@ pub struct ImageFaults {
 pub struct RadianceImage {
     width: usize,
     height: usize,
-    pixels: Box<[[f32; 3]]>,
+    pixels: Pixels,
     space: &'static ColorSpace,
     /// To the render's RGB, when that is another space than the image's.
     to_render: Option<[[f32; 3]; 3]>,
+}
+
+/// Colours, finite and not negative, in as few bytes as keep them exactly: looking up a sky is waiting for its memory.
+#[derive(Clone, Debug)]
+enum Pixels {
+    /// IEEE halves: what most files of radiance hold.
+    Half(Box<[[u16; 3]]>),
+    Single(Box<[[f32; 3]]>),
+}
+
+/// 2^112: the exponents of single and half precision differ by 112.
+const HALF_SCALE: f32 = 5.192_296_9e33;
+
+/// The value of a finite, non-negative half; subnormal ones too, since the product is exact.
+#[inline]
+fn from_half(half: u16) -> f32 {
+    f32::from_bits(u32::from(half) << 13) * HALF_SCALE
+}
+
+/// The half of this value, if there is one.
+fn exact_half(v: f32) -> Option<u16> {
+    let bits = (v * (1.0 / HALF_SCALE)).to_bits() >> 13;
+    let half = u16::try_from(bits).ok().filter(|&h| h < 0x7c00)?;
+    (from_half(half) == v).then_some(half)
+}
+
+impl Pixels {
+    fn new(pixels: Box<[[f32; 3]]>) -> Self {
+        let halves = |rgb: &[f32; 3]| Some([exact_half(rgb[0])?, exact_half(rgb[1])?, exact_half(rgb[2])?]);
+        match pixels.iter().map(halves).collect::<Option<Box<[_]>>>() {
+            Some(halves) => Self::Half(halves),
+            None => Self::Single(pixels),
+        }
+    }
+
+    #[inline]
+    fn at(&self, i: usize) -> [f32; 3] {
+        match self {
+            Self::Half(pixels) => pixels[i].map(from_half),
+            Self::Single(pixels) => pixels[i],
+        }
+    }
 }
 
 impl RadianceImage {
@@ -118,13 +160,13 @@ impl RadianceImage {
     ) -> Self {
         debug_assert_eq!(pixels.len(), width * height);
         let to_render = (space != render_space).then(|| space.convert_to(render_space));
-        Self { width, height, pixels, space, to_render }
+        Self { width, height, pixels: Pixels::new(pixels), space, to_render }
     }
 
     /// Another image with the same colour spaces.
     pub(crate) fn with_pixels(&self, width: usize, height: usize, pixels: Box<[[f32; 3]]>) -> Self {
         debug_assert_eq!(pixels.len(), width * height);
-        Self { width, height, pixels, space: self.space, to_render: self.to_render }
+        Self { width, height, pixels: Pixels::new(pixels), space: self.space, to_render: self.to_render }
     }
 
     /// Pixels in a row.
@@ -143,8 +185,14 @@ impl RadianceImage {
     }
 
     /// Row by row from the top.
-    pub fn pixels(&self) -> &[[f32; 3]] {
-        &self.pixels
+    pub fn pixels(&self) -> impl ExactSizeIterator<Item = [f32; 3]> + '_ {
+        (0..self.width * self.height).map(|i| self.pixels.at(i))
+    }
+
+    /// The pixel in column `x` of row `y` from the top, both within the image.
+    #[inline]
+    pub fn pixel(&self, x: usize, y: usize) -> [f32; 3] {
+        self.pixels.at(y * self.width + x)
     }
 
     /// The spectrum that `rgb` of the image stands for: a colour times the illuminant of its space.
@@ -170,7 +218,7 @@ impl RadianceImage {
         // The saturating casts send negatives and NaN to 0.
         let x = ((uv.x * self.width as f32) as usize).min(self.width - 1);
         let y = ((uv.y * self.height as f32) as usize).min(self.height - 1);
-        self.pixels[y * self.width + x]
+        self.pixel(x, y)
     }
 
     /// Bilinear between pixel centres, the border repeated outwards.
@@ -179,7 +227,7 @@ impl RadianceImage {
         self.blend(uv, |image, x, y| {
             let x = x.clamp(0, image.width as i64 - 1) as usize;
             let y = y.clamp(0, image.height as i64 - 1) as usize;
-            image.pixels[y * image.width + x]
+            image.pixel(x, y)
         })
     }
 
@@ -196,7 +244,7 @@ impl RadianceImage {
                 x = w - 1 - x;
                 y = if y < 0 { -y - 1 } else { 2 * h - 1 - y };
             }
-            image.pixels[(y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize]
+            image.pixel(x.clamp(0, w - 1) as usize, y.clamp(0, h - 1) as usize)
         })
     }
 
@@ -223,7 +271,7 @@ impl RadianceImage {
         (0..self.height)
             .flat_map(|y| (0..self.width).map(move |x| (x, y)))
             .map(|(x, y)| {
-                let rgb = self.pixels[y * self.width + x];
+                let rgb = self.pixel(x, y);
                 (rgb[0] + rgb[1] + rgb[2]) * (1.0 / 3.0) * weight(self.center_of(x, y))
             })
             .collect()
@@ -240,7 +288,7 @@ impl RadianceImage {
         let mut sum = [0f64; 3];
         for y in 0..self.height {
             for x in 0..self.width {
-                let rgb = self.pixels[y * self.width + x];
+                let rgb = self.pixel(x, y);
                 let w = f64::from(weight(self.center_of(x, y)));
                 for c in 0..3 {
                     sum[c] += f64::from(rgb[c]) * w;
@@ -278,8 +326,21 @@ mod tests {
         let image = Image::from_f32(2, 2, &["R", "G", "B"], samples).unwrap();
         let (r, faults) = RadianceImage::new(&image, ColorSpace::srgb()).unwrap();
         assert_eq!(faults, ImageFaults { not_finite: 2, negative: 1, first: Some([1, 0]) });
-        assert_eq!(r.pixels()[1], [0.0, 1.0, 1.0]);
-        assert_eq!(r.pixels()[2], [0.0, 2.0, 2.0]);
+        assert_eq!([r.pixel(1, 0), r.pixel(0, 1)], [[0.0, 1.0, 1.0], [0.0, 2.0, 2.0]]);
+    }
+
+    #[test]
+    fn halves_are_kept_as_halves_and_nothing_is_rounded() {
+        for half in 0..0x7c00 {
+            assert_eq!(exact_half(from_half(half)), Some(half));
+        }
+        assert_eq!((from_half(1), from_half(0x3c00), from_half(0x7bff)), (2f32.powi(-24), 1.0, 65504.0));
+        for v in [1.000_1, 65_520.0, 1e9, 1e-9, f32::MAX, f32::MIN_POSITIVE] {
+            assert_eq!(exact_half(v), None, "{v}");
+        }
+        let image = |v| checker(1, 1).with_pixels(1, 1, Box::new([[v, 0.5, 0.25]]));
+        assert!(matches!(image(2.0).pixels, Pixels::Half(_)) && matches!(image(0.1).pixels, Pixels::Single(_)));
+        assert_eq!((image(2.0).pixel(0, 0), image(0.1).pixel(0, 0)), ([2.0, 0.5, 0.25], [0.1, 0.5, 0.25]));
     }
 
     #[test]
@@ -288,9 +349,9 @@ mod tests {
         for y in 0..4 {
             for x in 0..4 {
                 let uv = image.center_of(x, y);
-                assert_eq!(image.nearest(uv), image.pixels[y * 4 + x]);
+                assert_eq!(image.nearest(uv), image.pixel(x, y));
                 for blended in [image.bilinear(uv), image.bilinear_octahedral(uv)] {
-                    assert!((0..3).all(|c| (blended[c] - image.pixels[y * 4 + x][c]).abs() < 1e-5));
+                    assert!((0..3).all(|c| (blended[c] - image.pixel(x, y)[c]).abs() < 1e-5));
                 }
             }
         }
@@ -306,13 +367,9 @@ mod tests {
     fn the_octahedral_border_is_seamless() {
         let n = 64;
         let f = |w: irradiant_math::Vec3| [2.0 + w.x, 2.0 + w.y * w.z, 2.0 + w.z];
-        let mut image = checker(n, n);
-        for y in 0..n {
-            for x in 0..n {
-                let w = irradiant_math::warp::equal_area_square_to_sphere(image.center_of(x, y));
-                image.pixels[y * n + x] = f(w);
-            }
-        }
+        let blank = checker(n, n);
+        let direction = |i| irradiant_math::warp::equal_area_square_to_sphere(blank.center_of(i % n, i / n));
+        let image = blank.with_pixels(n, n, (0..n * n).map(|i| f(direction(i))).collect());
         for i in 0..1000 {
             let t = (i as f32 + 0.5) / 1000.0;
             for far in [1e-6, 1.0 - 1e-6] {

@@ -13,9 +13,9 @@
 //! (Karlik et al. 2019, "MIS compensation", as in pbrt-v4), and a uniform environment is left to it altogether.
 
 use super::emission::RadianceImage;
+use super::environment_density::PixelDensity;
 use super::orientation::Orientation;
 use super::{Emission, EmittedRay, LightSample, LightTarget, SampleMode, SceneSphere};
-use irradiant_math::distribution::PiecewiseConstant2D;
 use irradiant_math::{Normal3, Point2, Vec3, warp};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 use std::f32::consts::PI;
@@ -83,8 +83,8 @@ pub struct ImageInfiniteLight {
     scene: SceneSphere,
     mean_rgb: [f32; 3],
     /// Each is made when first asked for; a render needs but one of them.
-    complete: OnceLock<PiecewiseConstant2D>,
-    compensated: OnceLock<PiecewiseConstant2D>,
+    complete: OnceLock<PixelDensity>,
+    compensated: OnceLock<PixelDensity>,
 }
 
 impl ImageInfiniteLight {
@@ -107,42 +107,28 @@ impl ImageInfiniteLight {
     }
 
     #[inline]
-    fn distribution(&self, mode: SampleMode) -> &PiecewiseConstant2D {
+    fn density(&self, mode: SampleMode) -> &PixelDensity {
         let cell = match mode {
             SampleMode::Complete => &self.complete,
             SampleMode::Compensated => &self.compensated,
         };
-        cell.get_or_init(|| self.make_distribution(mode))
-    }
-
-    fn make_distribution(&self, mode: SampleMode) -> PiecewiseConstant2D {
-        let mut weights = self.image.sampling_weights(|_| 1.0);
-        if mode == SampleMode::Compensated {
-            let mean = (weights.iter().map(|&w| f64::from(w)).sum::<f64>() / weights.len() as f64) as f32;
-            weights.iter_mut().for_each(|w| *w = (*w - mean).max(0.0));
-            if weights.iter().all(|&w| w == 0.0) {
-                weights.fill(1.0);
-            }
-        }
-        let size = self.image.width();
-        PiecewiseConstant2D::new(weights, size, size).expect("a square image has a weight for each pixel, and a pixel")
+        cell.get_or_init(|| {
+            PixelDensity::new(&self.image, mode == SampleMode::Compensated).expect("a square image has a pixel")
+        })
     }
 
     #[inline]
-    fn radiance(&self, uv: Point2, lambda: &Wavelengths) -> SampledSpectrum {
-        self.image.radiance(self.image.nearest(uv), lambda) * self.scale
+    fn radiance(&self, rgb: [f32; 3], lambda: &Wavelengths) -> SampledSpectrum {
+        self.image.radiance(rgb, lambda) * self.scale
     }
 
     /// See [`super::Light::sample`].
     #[inline]
     pub fn sample(&self, u: Point2, lambda: &Wavelengths, mode: SampleMode) -> Option<LightSample> {
-        let s = self.distribution(mode).sample(u);
-        if !(s.pdf > 0.0) {
-            return None;
-        }
-        let w = warp::equal_area_square_to_sphere(s.p);
+        let s = self.density(mode).sample(&self.image, u)?;
+        let w = warp::equal_area_square_to_sphere(s.uv);
         Some(LightSample {
-            radiance: self.radiance(s.p, lambda),
+            radiance: self.radiance(s.rgb, lambda),
             wi: self.orientation.to_render(w),
             pdf: s.pdf / (4.0 * PI * self.orientation.stretch(w)),
             target: LightTarget::Infinite,
@@ -156,13 +142,14 @@ impl ImageInfiniteLight {
     pub fn pdf(&self, wi: Vec3, mode: SampleMode) -> f32 {
         let w = self.orientation.to_light(wi);
         let uv = warp::equal_area_sphere_to_square(w);
-        self.distribution(mode).pdf(uv) / (4.0 * PI * self.orientation.stretch(w))
+        self.density(mode).pdf(self.image.nearest(uv)) / (4.0 * PI * self.orientation.stretch(w))
     }
 
     /// See [`super::Light::escaped`].
     #[inline]
     pub fn escaped(&self, direction: Vec3, lambda: &Wavelengths) -> SampledSpectrum {
-        self.radiance(warp::equal_area_sphere_to_square(self.orientation.to_light(direction)), lambda)
+        let uv = warp::equal_area_sphere_to_square(self.orientation.to_light(direction));
+        self.radiance(self.image.nearest(uv), lambda)
     }
 
     /// See [`super::Light::power`]; of the mean colour, which is the mean power but for the bend of uplifting.

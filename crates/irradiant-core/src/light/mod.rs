@@ -28,6 +28,8 @@ pub mod portal;
 pub mod projection;
 pub mod spot;
 
+mod environment_density;
+
 #[cfg(test)]
 mod tests;
 

@@ -84,7 +84,7 @@ impl ProjectionLight {
         let screen = Screen::new(image.width(), image.height(), fov);
         let weights = image.sampling_weights(|uv| screen.solid_angle_by_area(uv));
         let mean_rgb = image.mean_rgb(|uv| screen.solid_angle_by_area(uv));
-        let sum: f64 = image.pixels().iter().map(|c| f64::from(c[0].max(c[1]).max(c[2]))).sum();
+        let sum: f64 = image.pixels().map(|c| f64::from(c[0].max(c[1]).max(c[2]))).sum();
         let mean_max = (sum / image.pixels().len() as f64) as f32;
         let distribution = PiecewiseConstant2D::new(weights, image.width(), image.height())?;
         Some(Self { p, orientation, image, scale, screen, mean_rgb, mean_max, distribution })

@@ -415,7 +415,7 @@ fn sampled_densities_are_those_that_hits_report() {
             let Light::Area(a) = l else { panic!() };
             let u = u2(&mut rng);
             let Some(s) = l.sample(&at, u, &white, SampleMode::Complete) else { continue };
-            let drawn = a.shape.sample(&at, u).unwrap();
+            let drawn = a.shape.sample(&at, u, true).unwrap();
             let pdf = l.pdf_hit(&at, s.wi, &LightHit { p: drawn.p, n: drawn.n, uv: drawn.uv });
             assert!((pdf / s.pdf - 1.0).abs() < 2e-3, "{pdf} {}", s.pdf);
         }
@@ -623,6 +623,22 @@ fn powers_asked_for_are_powers_given() {
         let l = one_area(disk(2.0, 1.5, true), area(None, Some("slide"), two_sided, Some(30.0)), None);
         assert!((luminous(&l) / 30.0 - 1.0).abs() < 0.02);
     }
+}
+
+/// `power` is meant of each triangle, also where two of them became one light: it has both powers, and a radiance that
+/// one triangle alone would have.
+#[test]
+fn rectangles_of_two_triangles_have_the_power_of_each() {
+    let positions = vec![[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    let power = |triangles: &[[u32; 3]]| {
+        let data = MeshData { positions: positions.clone(), triangles: triangles.to_vec(), ..MeshData::default() };
+        let s = shape(ShapeKind::Mesh(Arc::new(data)), Transform::IDENTITY, false);
+        let l = one_area(s, area(Some(WHITE), None, false, Some(30.0)), None);
+        let Light::Area(a) = &l else { panic!("an area light") };
+        (film(|lambda| l.power(lambda))[1], a.scale)
+    };
+    let (one, two) = (power(&[[0, 1, 2]]), power(&[[0, 1, 2], [0, 2, 3]]));
+    assert!((two.0 / one.0 - 2.0).abs() < 1e-4 && (two.1 / one.1 - 1.0).abs() < 1e-4, "{one:?} {two:?}");
 }
 
 #[test]

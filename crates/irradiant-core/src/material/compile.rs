@@ -1,7 +1,7 @@
 //! From the description to materials: ranges checked, constants worked out, coats tabulated.
 
 use super::relief::{NormalMap, Relief};
-use super::{CoatValue, Coats, Entry, Facets, FillingValue, Index, Material, Materials, Metal};
+use super::{CoatValue, Coats, Entry, Facets, FillingValue, Index, Material, Materials, Metal, coat_weights};
 use crate::bxdf::{Coat, CoatWeights, Ggx, WalkLimits};
 use crate::interaction::MaterialId;
 use crate::texture::image::read_image;
@@ -20,19 +20,19 @@ use std::collections::BTreeMap;
 const PAINT_LEVELS: u32 = 17;
 
 /// Parameters of a coat, bit by bit.
-type CoatKey = (u32, [u32; 2], u32);
+type CoatKey = (u32, [u32; 2], u32, bool);
 
 /// A coat to be tabulated: tables take milliseconds each, so they are made side by side at the end.
 #[derive(Clone, Copy, Debug)]
 enum CoatPlan {
-    Clear { eta: f32, facets: Ggx, thickness: f32 },
+    Clear { eta: f32, facets: Ggx, thickness: f32, weights: CoatWeights },
     Lossless { eta: f32, alpha: f32 },
 }
 
 impl CoatPlan {
     fn make(&self) -> Coat {
         match *self {
-            Self::Clear { eta, facets, thickness } => Coat::new(eta, facets, thickness, CoatWeights::Pbrt),
+            Self::Clear { eta, facets, thickness, weights } => Coat::new(eta, facets, thickness, weights),
             Self::Lossless { eta, alpha } => Coat::lossless(eta, alpha),
         }
     }
@@ -49,6 +49,7 @@ struct Compiler<'a> {
     normal_maps: Vec<NormalMap>,
     normal_map_ids: BTreeMap<std::path::PathBuf, Option<u32>>,
     coat_depth_limit: Option<u32>,
+    pbrt_coat_weights: bool,
 }
 
 impl Materials {
@@ -72,12 +73,14 @@ impl Materials {
             normal_maps: Vec::new(),
             normal_map_ids: BTreeMap::new(),
             coat_depth_limit: None,
+            pbrt_coat_weights: false,
         };
         let mut entries: Vec<Entry> =
             desc.materials.iter().map(|m| Entry { material: c.material(&m.kind), relief: c.relief(m) }).collect();
         c.check_mixes(&mut entries);
         let (normal_maps, coat_depth_limit) = (c.normal_maps, c.coat_depth_limit);
-        let coats = c.coats.par_iter().map(CoatPlan::make).collect();
+        let coats: Vec<Coat> = c.coats.par_iter().map(CoatPlan::make).collect();
+        let pbrt_coat_weights = c.pbrt_coat_weights || coats.iter().any(Coat::has_pbrt_weights);
         let names = desc.materials.iter().map(|m| m.name.clone().unwrap_or_else(|| kind_name(&m.kind).into()));
         Self {
             names: names.collect(),
@@ -86,6 +89,7 @@ impl Materials {
             normal_maps,
             force_diffuse: desc.options.force_diffuse,
             coat_depth_limit,
+            pbrt_coat_weights,
         }
     }
 }
@@ -186,7 +190,8 @@ impl Compiler<'_> {
         }
     }
 
-    fn coat(&mut self, desc: &CoatDesc, over_diffuse: bool) -> CoatValue {
+    /// A coat over a metal with these facets, or over a diffuse base.
+    fn coat(&mut self, desc: &CoatDesc, metal: Option<Facets>) -> CoatValue {
         let facets = self.facets(&desc.roughness);
         let eta = self.index(&desc.eta);
         let thickness =
@@ -209,14 +214,21 @@ impl Compiler<'_> {
             let depth = u32::from(limits.max_depth);
             self.coat_depth_limit = Some(self.coat_depth_limit.map_or(depth, |least| least.min(depth)));
         }
+        let weights = coat_weights(limits);
         let mut tabulated = None;
-        if let (true, Index::Constant(eta), Facets::Constant(ggx), Some(thickness)) =
-            (over_diffuse, eta, facets, thickness.as_constant())
+        if let (None, Index::Constant(eta), Facets::Constant(ggx), Some(thickness)) =
+            (metal, eta, facets, thickness.as_constant())
         {
             let [x, y] = ggx.alphas();
             // Anisotropic coats are not tabulated, but copying one is no slower than making it.
-            let key = (eta.to_bits(), [x.to_bits(), y.to_bits()], thickness.to_bits());
-            tabulated = Some(self.tabulated(key, CoatPlan::Clear { eta, facets: ggx, thickness }));
+            let exact = weights == CoatWeights::Exact;
+            let key = (eta.to_bits(), [x.to_bits(), y.to_bits()], thickness.to_bits(), exact);
+            tabulated = Some(self.tabulated(key, CoatPlan::Clear { eta, facets: ggx, thickness, weights }));
+        } else if weights == CoatWeights::Pbrt {
+            // Walks use the weights where a rough coat lies over anything that is not a mirror.
+            let smooth = |facets: Facets| matches!(facets, Facets::Constant(ggx) if ggx.is_smooth());
+            let mirror = metal.is_some_and(smooth) && filling.is_none();
+            self.pbrt_coat_weights |= !(smooth(facets) || matches!(eta, Index::Constant(1.0)) || mirror);
         }
         CoatValue { tabulated, eta, facets, thickness, filling, limits }
     }
@@ -268,13 +280,12 @@ impl Compiler<'_> {
             MaterialKind::ThinDielectric { eta } => Material::ThinDielectric { eta: self.index(eta) },
             MaterialKind::CoatedDiffuse { reflectance, coat } => Material::CoatedDiffuse {
                 reflectance: self.reflectance(reflectance, "the reflectance"),
-                coat: self.coat(coat, true),
+                coat: self.coat(coat, None),
             },
-            MaterialKind::CoatedConductor { fresnel, roughness, coat } => Material::CoatedConductor {
-                metal: self.metal(fresnel),
-                facets: self.facets(roughness),
-                coat: self.coat(coat, false),
-            },
+            MaterialKind::CoatedConductor { fresnel, roughness, coat } => {
+                let (metal, facets) = (self.metal(fresnel), self.facets(roughness));
+                Material::CoatedConductor { metal, facets, coat: self.coat(coat, Some(facets)) }
+            }
             MaterialKind::Mix { materials, amount } => {
                 let value = self.textures.float_param(amount.value);
                 if let FloatParam::Value(v) = amount.value {
@@ -359,7 +370,7 @@ impl Compiler<'_> {
         // Paints of the same index that vary share their levels.
         let count = alphas.len() as u32;
         let level = if count == 1 { alphas[0].to_bits() } else { u32::MAX };
-        let key = (index.to_bits(), [level, count], u32::MAX);
+        let key = (index.to_bits(), [level, count], u32::MAX, true);
         let coats = &mut self.coats;
         let first = *self.coat_ids.entry(key).or_insert_with(|| {
             let first = coats.len() as u32;

@@ -159,6 +159,12 @@ impl CoatValue {
     }
 }
 
+/// A depth limit says that the author looked at pbrt-v4's picture, so its weights are kept; 0, our own meaning, is exact.
+#[inline]
+fn coat_weights(limits: WalkLimits) -> CoatWeights {
+    if limits.max_depth == 0 { CoatWeights::Exact } else { CoatWeights::Pbrt }
+}
+
 /// A material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Material {
@@ -274,6 +280,7 @@ pub struct Materials {
     normal_maps: Vec<NormalMap>,
     force_diffuse: bool,
     coat_depth_limit: Option<u32>,
+    pbrt_coat_weights: bool,
 }
 
 /// Samples with which a material's albedo is estimated when all are forced to be diffuse.
@@ -350,7 +357,7 @@ impl Materials {
                     let r = reflectance(*r, lambda);
                     let (facets, thickness) = (coat.facets.at(textures, tex), textures.float(coat.thickness, tex));
                     let eta = coat.eta.at(textures, tex, lambda);
-                    let walked = Coat::walked(eta, facets, thickness, CoatWeights::Pbrt);
+                    let walked = Coat::walked(eta, facets, thickness, coat_weights(coat.limits));
                     Bxdf::CoatedDiffuse(CoatedDiffuse::new(&walked, r, filling, coat.limits))
                 }
             }
@@ -361,7 +368,7 @@ impl Materials {
                 Bxdf::CoatedConductor(CoatedConductor::new(
                     interface,
                     textures.float(coat.thickness, tex),
-                    CoatWeights::Pbrt,
+                    coat_weights(coat.limits),
                     eta,
                     k,
                     facets.at(textures, tex),
@@ -421,6 +428,12 @@ impl Materials {
     /// The smallest depth to which walks within coats are followed, if any is limited: pictures lose light there.
     pub fn coat_depth_limit(&self) -> Option<u32> {
         self.coat_depth_limit
+    }
+
+    /// Whether a coat is evaluated with pbrt-v4's weights where they differ from the right ones ([`CoatWeights::Pbrt`]):
+    /// rough coats whose depth is limited. The picture is then biased, as pbrt-v4's is.
+    pub fn uses_pbrt_coat_weights(&self) -> bool {
+        self.pbrt_coat_weights
     }
 }
 

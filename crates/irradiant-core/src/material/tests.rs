@@ -494,3 +494,36 @@ fn impossible_parameters_are_reported() {
     let (_, m) = compile(&scene(vec![coated(depth(0))]));
     assert_eq!(m.coat_depth_limit(), None);
 }
+
+#[test]
+fn coats_are_weighed_as_pbrt_does_only_where_the_author_limits_their_depth() {
+    let diffuse = |roughness, depth| MaterialKind::CoatedDiffuse {
+        reflectance: grey(0.5),
+        coat: CoatDesc { max_depth: Spanned::unplaced(depth), ..coat(roughness) },
+    };
+    let conductor = |roughness, base, depth| MaterialKind::CoatedConductor {
+        fresnel: metal("Al"),
+        roughness: rough(base),
+        coat: CoatDesc { max_depth: Spanned::unplaced(depth), ..coat(roughness) },
+    };
+    let cases = [
+        (diffuse(0.0, 10), false),
+        (diffuse(0.2, 10), true),
+        (diffuse(0.2, 0), false),
+        (conductor(0.2, 0.1, 10), true),
+        (conductor(0.2, 0.0, 10), false),
+        (conductor(0.0, 0.1, 10), false),
+        (conductor(0.2, 0.1, 0), false),
+    ];
+    for (kind, expected) in cases {
+        let text = format!("{kind:?}");
+        assert_eq!(compile(&scene(vec![kind])).1.uses_pbrt_coat_weights(), expected, "{text}");
+    }
+    // One coat of either kind, though all else is equal.
+    let (t, m) = compile(&scene(vec![diffuse(0.2, 10), diffuse(0.2, 0)]));
+    let value = |id| {
+        let bsdf = bsdf_at(&t, &m, id, &flat(), &mut lambda()).unwrap();
+        bsdf.f(Vec3::Z, Vec3::new(0.6, 0.0, 0.8), crate::bxdf::TransportMode::Radiance)[0]
+    };
+    assert!(m.uses_pbrt_coat_weights() && value(0) != value(1));
+}

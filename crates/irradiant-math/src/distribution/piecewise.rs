@@ -115,6 +115,13 @@ impl PiecewiseConstant1D {
         Sample1D { x: crate::elementary::lerp(t, self.min, self.max), pdf: self.pdf_of_cell(offset), offset }
     }
 
+    /// The cell that holds the point with distribution function `u`, and where in it that lies, in [0, 1).
+    #[inline]
+    pub fn sample_cell(&self, u: f32) -> (usize, f32) {
+        let cell = find_cell(&self.cdf, u);
+        (cell, place_in_cell(&self.cdf, cell, u))
+    }
+
     #[inline]
     fn pdf_of_cell(&self, offset: usize) -> f32 {
         if self.integral > 0.0 { self.values[offset] / self.integral } else { 0.0 }

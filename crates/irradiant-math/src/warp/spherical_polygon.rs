@@ -1,6 +1,6 @@
 //! Triangles and rectangles as seen from a point: uniform by solid angle, with inverse.
 
-use crate::elementary::{ONE_MINUS_EPSILON, acos_core, atan2, safe_sqrt, sin_cos, sin_cos_core};
+use crate::elementary::{ONE_MINUS_EPSILON, atan2, atan2_core, safe_sqrt, sin_cos, sin_cos_core};
 use crate::vector::{Point2, Point3, Vec3};
 
 /// A triangle projected to the unit sphere around a point, ready to be sampled by solid angle.
@@ -42,6 +42,12 @@ impl SphericalTriangle {
     #[inline]
     pub fn solid_angle(&self) -> f32 {
         self.solid_angle
+    }
+
+    /// Directions of the vertices, unit.
+    #[inline]
+    pub fn corners(&self) -> [Vec3; 3] {
+        [self.a, self.b, self.c]
     }
 
     /// Uniform direction of the triangle; unit length.
@@ -106,23 +112,62 @@ impl SphericalTriangle {
 
 /// A rectangle seen from a point, ready to be sampled by solid angle.
 ///
-/// Urena, Fajardo and King 2013, "An area-preserving parametrization for spherical rectangles". Angles are computed in
-/// `f64`, since the solid angle is a small difference of large ones.
+/// The map is that of Urena, Fajardo and King 2013, "An area-preserving parametrization for spherical rectangles", but
+/// their sums of arc cosines are arguments of products of complex numbers here, so that one `atan2` makes the solid
+/// angle and one `sin_cos` a sample. In `f64`, since the solid angle is a small difference of large ones.
 #[derive(Clone, Copy, Debug)]
 pub struct SphericalRectangle {
     origin: Point3,
     x: Vec3,
     y: Vec3,
+    /// Towards the rectangle's plane.
     z: Vec3,
     x0: f64,
     x1: f64,
     y0: f64,
     y1: f64,
-    z0: f64,
-    b0: f64,
-    b1: f64,
-    k: f64,
+    /// Distance of the plane, > 0.
+    h: f64,
+    /// Distances of the corners (x0, y0), (x1, y0), (x0, y1), (x1, y1).
+    corners: [f64; 4],
+    /// With the angle that the edge x0 makes (see `edge_turn`).
+    start: Turn,
     solid_angle: f64,
+}
+
+/// An angle as a point in its direction, of any length.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    cos: f64,
+    sin: f64,
+}
+
+impl Turn {
+    /// The sum of the angles.
+    #[inline(always)]
+    fn plus(self, b: Self) -> Self {
+        Self { cos: self.cos * b.cos - self.sin * b.sin, sin: self.sin * b.cos + self.cos * b.sin }
+    }
+
+    /// The difference of the angles.
+    #[inline(always)]
+    fn minus(self, b: Self) -> Self {
+        self.plus(Self { cos: b.cos, sin: -b.sin })
+    }
+
+    /// The angle, in [0, 2 pi).
+    #[inline(always)]
+    fn angle(self) -> f64 {
+        let a = atan2_core(self.sin, self.cos);
+        if a < 0.0 { a + std::f64::consts::TAU } else { a }
+    }
+}
+
+/// atan(x y1 / (h d1)) - atan(x y0 / (h d0)): the solid angle of the strip [0, x] x [y0, y1] at height h, where d0 and d1
+/// are the distances of (x, y0, h) and (x, y1, h).
+#[inline(always)]
+fn edge_turn(x: f64, y0: f64, y1: f64, h: f64, d0: f64, d1: f64) -> Turn {
+    Turn { cos: h * d1, sin: x * y1 }.minus(Turn { cos: h * d0, sin: x * y0 })
 }
 
 impl SphericalRectangle {
@@ -132,32 +177,26 @@ impl SphericalRectangle {
     pub fn new(p: Point3, s: Point3, ex: Vec3, ey: Vec3) -> Option<Self> {
         let (length_x, length_y) = (ex.length(), ey.length());
         let (x, y) = (ex / length_x, ey / length_y);
-        let mut z = x.cross(y);
+        Self::with_axes(p, s, [x, y, x.cross(y)], [length_x, length_y])
+    }
+
+    /// As [`SphericalRectangle::new`], for edges along the first two of three orthonormal `axes` and their lengths.
+    #[inline]
+    pub fn with_axes(p: Point3, s: Point3, axes: [Vec3; 3], lengths: [f32; 2]) -> Option<Self> {
         let d = s - p;
-        let mut z0 = d.dot(z);
-        // The rectangle lies on the negative side of its own z.
-        if z0 > 0.0 {
-            z = -z;
-            z0 = -z0;
-        }
-        let (x0, y0, z0) = (d.dot(x) as f64, d.dot(y) as f64, z0 as f64);
-        let (x1, y1) = (x0 + length_x as f64, y0 + length_y as f64);
-        let angles = Angles::new(x0, x1, y0, y1, z0)?;
-        Some(Self {
-            origin: p,
-            x,
-            y,
-            z,
-            x0,
-            x1,
-            y0,
-            y1,
-            z0,
-            b0: angles.b0,
-            b1: angles.b1,
-            k: std::f64::consts::TAU - angles.g2 - angles.g3,
-            solid_angle: angles.solid_angle,
-        })
+        let [x, y, z] = axes;
+        let (x0, y0, height) = (d.dot(x) as f64, d.dot(y) as f64, d.dot(z));
+        let (x1, y1, h) = (x0 + lengths[0] as f64, y0 + lengths[1] as f64, height.abs() as f64);
+        let h2 = h * h;
+        let (c0, c1) = (x0 * x0 + h2, x1 * x1 + h2);
+        let (s0, s1) = (y0 * y0, y1 * y1);
+        let corners = [c0 + s0, c1 + s0, c0 + s1, c1 + s1].map(f64::sqrt);
+        let start = edge_turn(x0, y0, y1, h, corners[0], corners[2]);
+        let solid_angle = edge_turn(x1, y0, y1, h, corners[1], corners[3]).minus(start).angle();
+        // Far away or almost in its plane, rounding leaves nothing (or a full turn); NaN compares false too.
+        let sound = h > 0.0 && solid_angle > 0.0 && solid_angle < std::f64::consts::TAU;
+        let z = if height < 0.0 { -z } else { z };
+        sound.then_some(Self { origin: p, x, y, z, x0, x1, y0, y1, h, corners, start, solid_angle })
     }
 
     /// Solid angle, in (0, 2 pi) steradians; its reciprocal is the density of [`SphericalRectangle::sample`].
@@ -166,20 +205,52 @@ impl SphericalRectangle {
         self.solid_angle as f32
     }
 
+    /// Distances of the corners `s`, `s + ex`, `s + ey`, `s + ex + ey`.
+    #[inline]
+    pub fn corner_distances(&self) -> [f32; 4] {
+        self.corners.map(|d| d as f32)
+    }
+
+    /// Where on the rectangle a direction uniform over its solid angle leads: distances from `s` along the edges.
+    #[inline]
+    pub fn sample_along(&self, u: Point2) -> [f32; 2] {
+        let (h, y0, y1) = (self.h, self.y0, self.y1);
+        let h2 = h * h;
+        // The edge x that leaves the share u.x: its strip angle is phi = that of x0 plus the share.
+        let (sin, cos) = sin_cos_core(u.x as f64 * self.solid_angle);
+        let phi = self.start.plus(Turn { cos, sin });
+        // Sines of the heights of the edges y0, y1 above x = 0; the strip angle of x has, with s = sin phi, c = cos phi,
+        // x = h s / sqrt((b1 - b0 c)^2 - (1 - b0^2) s^2).
+        let (r0, r1) = ((h2 + y0 * y0).sqrt(), (h2 + y1 * y1).sqrt());
+        // The same multiplied by r0 r1 and the length of phi.
+        let length = (phi.cos * phi.cos + phi.sin * phi.sin).sqrt();
+        let n = y1 * r0 * length - y0 * r1 * phi.cos;
+        let m = h * r1 * phi.sin;
+        let x = h * phi.sin * (r0 * r1) / ((n - m) * (n + m)).max(0.0).sqrt();
+        // Infinite or NaN at the far end of a long strip.
+        let x = if x > self.x0 {
+            x.min(self.x1)
+        } else if phi.sin > 0.0 && !(x <= self.x1) {
+            self.x1
+        } else {
+            self.x0
+        };
+        // Along that line, uniform in the sine of the height.
+        let d2 = x * x + h2;
+        let s0 = y0 / (d2 + y0 * y0).sqrt();
+        let s1 = y1 / (d2 + y1 * y1).sqrt();
+        let s = s0 + u.y as f64 * (s1 - s0);
+        let rest = 1.0 - s * s;
+        let y = if rest > 1e-12 { (s * (d2 / rest).sqrt()).clamp(y0, y1) } else { y1 };
+        [(x - self.x0) as f32, (y - y0) as f32]
+    }
+
     /// The point of the rectangle in a direction that is uniform over its solid angle.
     #[inline]
     pub fn sample(&self, u: Point2) -> Point3 {
-        let (sin_au, cos_au) = sin_cos_core(u.x as f64 * self.solid_angle + self.k);
-        let fu = (cos_au * self.b0 - self.b1) / sin_au;
-        let cu = (1.0 / (fu * fu + self.b0 * self.b0).sqrt()).copysign(fu).clamp(-1.0 + 1e-14, 1.0 - 1e-14);
-        let xu = (-(cu * self.z0) / (1.0 - cu * cu).sqrt()).clamp(self.x0, self.x1);
-        let d2 = xu * xu + self.z0 * self.z0;
-        let h0 = self.y0 / (d2 + self.y0 * self.y0).sqrt();
-        let h1 = self.y1 / (d2 + self.y1 * self.y1).sqrt();
-        let hv = h0 + u.y as f64 * (h1 - h0);
-        let rest = 1.0 - hv * hv;
-        let yv = if rest > 1e-12 { (hv * (d2 / rest).sqrt()).clamp(self.y0, self.y1) } else { self.y1 };
-        self.origin + self.x * xu as f32 + self.y * yv as f32 + self.z * self.z0 as f32
+        let [a, b] = self.sample_along(u);
+        let (x, y) = (self.x0 + a as f64, self.y0 + b as f64);
+        self.origin + self.x * x as f32 + self.y * y as f32 + self.z * self.h as f32
     }
 
     /// The `u` that [`SphericalRectangle::sample`] maps to the point `q` of the rectangle; clamped to the unit square.
@@ -188,50 +259,19 @@ impl SphericalRectangle {
     #[inline]
     pub fn inverse(&self, q: Point3) -> Point2 {
         let d = q - self.origin;
-        let xu = (d.dot(self.x) as f64).clamp(self.x0, self.x1);
-        let yv = (d.dot(self.y) as f64).clamp(self.y0, self.y1);
-        let near = Angles::new(self.x0, xu, self.y0, self.y1, self.z0).map_or(0.0, |a| a.solid_angle);
-        let d2 = xu * xu + self.z0 * self.z0;
-        let h = |y: f64| y / (d2 + y * y).sqrt();
-        let (h0, h1) = (h(self.y0), h(self.y1));
+        let x = (d.dot(self.x) as f64).clamp(self.x0, self.x1);
+        let y = (d.dot(self.y) as f64).clamp(self.y0, self.y1);
+        let d2 = x * x + self.h * self.h;
+        let (d0, d1) = ((d2 + self.y0 * self.y0).sqrt(), (d2 + self.y1 * self.y1).sqrt());
+        let part = edge_turn(x, self.y0, self.y1, self.h, d0, d1).minus(self.start);
+        // A hair below zero is zero, not a full turn; a true share is never beyond the whole.
+        let near = part.angle();
+        let near = if near > 0.5 * (self.solid_angle + std::f64::consts::TAU) { 0.0 } else { near };
+        let (s0, s1) = (self.y0 / d0, self.y1 / d1);
+        let s = y / (d2 + y * y).sqrt();
         let inside = |v: f64| (v as f32).clamp(0.0, ONE_MINUS_EPSILON);
-        Point2::new(inside(near / self.solid_angle), inside((h(yv) - h0) / (h1 - h0)))
+        Point2::new(inside(near / self.solid_angle), inside((s - s0) / (s1 - s0)))
     }
-}
-
-/// Solid angle of an axis-aligned rectangle at height z0 < 0, and what sampling it needs.
-struct Angles {
-    b0: f64,
-    b1: f64,
-    g2: f64,
-    g3: f64,
-    solid_angle: f64,
-}
-
-impl Angles {
-    fn new(x0: f64, x1: f64, y0: f64, y1: f64, z0: f64) -> Option<Self> {
-        // z components of the unit normals of the four planes through the eye and an edge.
-        let normal_z = |t: f64| t / (z0 * z0 + t * t).sqrt();
-        let (n0, n1, n2, n3) = (-normal_z(y0), normal_z(x1), normal_z(y1), -normal_z(x0));
-        let [g0, g1, g2, g3] = [-n0 * n1, -n1 * n2, -n2 * n3, -n3 * n0].map(acos_core);
-        let solid_angle = g0 + g1 + g2 + g3 - std::f64::consts::TAU;
-        // Two triangles by van Oosterom and Strackee, whose small angles do not cancel as the sum of corners does.
-        let small = solid_angle < 0.05;
-        let solid_angle = if small { two_triangles(x0, x1, y0, y1, z0) } else { solid_angle };
-        (solid_angle > 0.0).then_some(Self { b0: n0, b1: n2, g2, g3, solid_angle })
-    }
-}
-
-fn two_triangles(x0: f64, x1: f64, y0: f64, y1: f64, z: f64) -> f64 {
-    let length = |x: f64, y: f64| (x * x + y * y + z * z).sqrt();
-    let dot = |a: (f64, f64), b: (f64, f64)| a.0 * b.0 + a.1 * b.1 + z * z;
-    let triangle = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| {
-        let (la, lb, lc) = (length(a.0, a.1), length(b.0, b.1), length(c.0, c.1));
-        let volume = ((x1 - x0) * (y1 - y0) * z).abs();
-        2.0 * crate::elementary::atan2_core(volume, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
-    };
-    let corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)];
-    triangle(corners[0], corners[1], corners[2]) + triangle(corners[0], corners[2], corners[3])
 }
 
 #[cfg(test)]

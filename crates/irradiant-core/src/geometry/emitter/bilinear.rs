@@ -1,6 +1,6 @@
 //! Bilinear patches: rectangles by solid angle, warped by the cosine at the receiver; others by area.
 
-use super::{Drawn, NormalCone, ShapeSample, cosine_weights};
+use super::{Drawn, Nearness, NormalCone, ShapeSample, cosine_weights};
 use crate::geometry::bilinear::{self, Corners};
 use crate::geometry::placement::{cross, dot, double, length, scale, single, sub};
 use crate::interaction::ReferencePoint;
@@ -22,6 +22,7 @@ pub struct BilinearEmitter {
     /// Area per du dv at the corners.
     weights: [f32; 4],
     area: f32,
+    near: Nearness,
 }
 
 impl BilinearEmitter {
@@ -44,6 +45,7 @@ impl BilinearEmitter {
             is_rectangle: bilinear::is_rectangle(&p),
             weights,
             area: (sum / (N * N) as f64) as f32,
+            near: Nearness::new(p.map(|c| Point3::from(single(c)))),
         }
     }
 
@@ -127,7 +129,7 @@ impl BilinearEmitter {
     }
 
     fn seen_from(&self, p: Point3) -> Option<SphericalRectangle> {
-        if !self.is_rectangle {
+        if !self.is_rectangle || self.near.is_far(p) {
             return None;
         }
         let corner = |i: usize| Point3::from(single(self.p[i]));

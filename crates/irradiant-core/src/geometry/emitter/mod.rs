@@ -1,18 +1,20 @@
 //! Shapes as light sources: points drawn from them, uniformly by area or well distributed as seen from a point.
 //!
 //! Each emissive triangle, patch and quadric is one [`EmitterShape`], self-contained, in render space. Methods as in
-//! pbrt-v4, section 6: spheres by the cone they subtend; triangles and rectangles by solid angle, warped by the cosine at
-//! the receiver; all else by area. Where we depart: quadrics may be scaled unevenly and cut (pbrt samples whole,
+//! pbrt-v4, section 6: spheres by the cone they subtend; triangles and rectangles that are near by solid angle, warped by
+//! the cosine at the receiver; all else by area. Two triangles that are a rectangle are one emitter. Where we depart: quadrics may be scaled unevenly and cut (pbrt samples whole,
 //! unscaled spheres), since densities here follow the surface that rays meet.
 //!
 //! Densities are per unit area of render space or per steradian, as each function says. It knows nothing of light.
 
 mod bilinear;
 mod quadric;
+mod rectangle;
 mod triangle;
 
 pub use bilinear::BilinearEmitter;
 pub use quadric::{CylinderEmitter, DiskEmitter, SphereEmitter};
+pub use rectangle::RectangleEmitter;
 pub use triangle::TriangleEmitter;
 
 use crate::interaction::ReferencePoint;
@@ -27,7 +29,7 @@ pub struct ShapeSample {
     pub p_error: Vec3,
     /// Geometric normal, unit, on the outer side: the same side as a ray's hit of that point would report.
     pub n: Normal3,
-    /// Surface parameters, as a hit would report.
+    /// Surface parameters, as a hit would report; (0, 0) if they were not asked for and are not to be had for nothing.
     pub uv: Point2,
     /// Density, > 0 and finite: per unit area or per steradian, as the drawing function says.
     pub pdf: f32,
@@ -52,6 +54,8 @@ impl NormalCone {
 pub enum EmitterShape {
     /// A triangle.
     Triangle(Box<TriangleEmitter>),
+    /// A rectangle of two triangles.
+    Rectangle(Box<RectangleEmitter>),
     /// A bilinear patch.
     Bilinear(Box<BilinearEmitter>),
     /// A sphere, perhaps cut or deformed by an affine map.
@@ -69,6 +73,7 @@ impl EmitterShape {
     pub fn area(&self) -> f32 {
         match self {
             Self::Triangle(e) => e.area(),
+            Self::Rectangle(e) => e.area(),
             Self::Bilinear(e) => e.area(),
             Self::Sphere(e) => e.area(),
             Self::Disk(e) => e.area(),
@@ -81,6 +86,7 @@ impl EmitterShape {
     pub(crate) fn memory_bytes(&self) -> usize {
         match self {
             Self::Triangle(e) => size_of_val(&**e),
+            Self::Rectangle(e) => size_of_val(&**e),
             Self::Bilinear(e) => size_of_val(&**e),
             Self::Sphere(e) => size_of_val(&**e),
             Self::Disk(e) => size_of_val(&**e),
@@ -93,6 +99,7 @@ impl EmitterShape {
     pub fn bounds(&self) -> Bounds3 {
         match self {
             Self::Triangle(e) => e.bounds(),
+            Self::Rectangle(e) => e.bounds(),
             Self::Bilinear(e) => e.bounds(),
             Self::Sphere(e) => e.bounds(),
             Self::Disk(e) => e.bounds(),
@@ -105,6 +112,7 @@ impl EmitterShape {
     pub fn normal_cone(&self) -> NormalCone {
         match self {
             Self::Triangle(e) => e.normal_cone(),
+            Self::Rectangle(e) => e.normal_cone(),
             Self::Bilinear(e) => e.normal_cone(),
             Self::Disk(e) => NormalCone { axis: e.normal().as_vec(), cos_angle: 1.0 },
             Self::Sphere(_) | Self::Cylinder(_) | Self::Curve(_) => NormalCone::ALL,
@@ -112,11 +120,12 @@ impl EmitterShape {
     }
 
     /// A point of the surface; `pdf` per unit area. Uniform but for curved patches and uneven scales, where it is near.
-    pub fn sample_area(&self, u: Point2) -> Option<ShapeSample> {
+    pub fn sample_area(&self, u: Point2, wants_uv: bool) -> Option<ShapeSample> {
         let s = match self {
             Self::Triangle(e) => e.sample_area(u),
+            Self::Rectangle(e) => e.sample_area(u, wants_uv),
             Self::Bilinear(e) => e.sample_area(u),
-            Self::Sphere(e) => e.sample_area(u),
+            Self::Sphere(e) => e.sample_area(u, wants_uv),
             Self::Disk(e) => e.sample_area(u),
             Self::Cylinder(e) => e.sample_area(u),
             Self::Curve(_) => return None,
@@ -128,18 +137,20 @@ impl EmitterShape {
     ///
     /// `None` when there is nothing to draw: the shape is seen edge-on, `at` lies on it, or it is a curve. The point may
     /// be hidden by another part of the same shape, or show its inner side.
-    pub fn sample(&self, at: &ReferencePoint, u: Point2) -> Option<ShapeSample> {
+    #[inline]
+    pub fn sample(&self, at: &ReferencePoint, u: Point2, wants_uv: bool) -> Option<ShapeSample> {
         let drawn = match self {
             Self::Triangle(e) => e.sample(at, u),
+            Self::Rectangle(e) => e.sample(at, u, wants_uv),
             Self::Bilinear(e) => e.sample(at, u),
-            Self::Sphere(e) => e.sample(at, u),
+            Self::Sphere(e) => e.sample(at, u, wants_uv),
             Self::Disk(_) | Self::Cylinder(_) => Drawn::ByArea,
             Self::Curve(_) => return None,
         };
         let s = match drawn {
             Drawn::BySolidAngle(s) => s,
             Drawn::ByArea => {
-                let mut s = self.sample_area(u)?;
+                let mut s = self.sample_area(u, wants_uv)?;
                 let to = s.p - at.p;
                 s.pdf *= solid_angle_per_area_inverse(to, s.n)?;
                 s
@@ -155,6 +166,7 @@ impl EmitterShape {
     pub fn pdf(&self, at: &ReferencePoint, wi: Vec3, p: Point3, n: Normal3, uv: Point2) -> f32 {
         let by_solid_angle = match self {
             Self::Triangle(e) => e.pdf(at, wi),
+            Self::Rectangle(e) => e.pdf(at, p),
             Self::Bilinear(e) => e.pdf(at, p),
             Self::Sphere(e) => e.pdf(at, wi, p),
             Self::Disk(_) | Self::Cylinder(_) => None,
@@ -172,6 +184,7 @@ impl EmitterShape {
     pub fn pdf_area(&self, p: Point3, n: Normal3, uv: Point2) -> f32 {
         match self {
             Self::Triangle(e) => 1.0 / e.area(),
+            Self::Rectangle(e) => 1.0 / e.area(),
             Self::Bilinear(e) => e.pdf_area(p, uv),
             Self::Sphere(e) => e.pdf_area(n),
             Self::Disk(e) => 1.0 / e.area(),
@@ -197,7 +210,43 @@ fn solid_angle_per_area_inverse(to: Vec3, n: Normal3) -> Option<f32> {
 /// Weights that make a bilinear density follow |cos| at the receiver, never below 0.01.
 #[inline]
 fn cosine_weights(ns: Normal3, directions: [Vec3; 4]) -> [f32; 4] {
-    directions.map(|w| ns.dot(w).abs().max(0.01))
+    cosine_weights_of(directions.map(|w| ns.dot(w)))
+}
+
+/// The same from cosines.
+#[inline]
+fn cosine_weights_of(cosines: [f32; 4]) -> [f32; 4] {
+    cosines.map(|c| c.abs().max(0.01))
+}
+
+/// Flat shapes whose squared radius is less than this share of their squared distance are sampled by area.
+///
+/// By solid angle costs some 70 ns more and pays only close to a light. In the Cornell box, at equal samples and against
+/// solid angles everywhere: 0.03 takes 0.93 of the time and 1.004 of the variance, 0.1 takes 0.83 and 1.02, no limit
+/// takes 0.79 and 1.04 but has no bound on its variance near a light.
+const FAR: f32 = 0.08;
+
+/// From where on a flat shape is so far that all of it is seen about alike, and a point by area will do.
+#[derive(Clone, Copy, Debug)]
+struct Nearness {
+    center: Point3,
+    /// Squared distance from the centre.
+    limit: f32,
+}
+
+impl Nearness {
+    fn new<const N: usize>(corners: [Point3; N]) -> Self {
+        let sum = corners.iter().fold(Vec3::ZERO, |sum, c| sum + c.as_vec() * (1.0 / N as f32));
+        let center = sum.as_point();
+        let radius = corners.iter().fold(0.0f32, |r, c| r.max(c.distance(center)));
+        Self { center, limit: radius * radius / FAR }
+    }
+
+    /// False for NaN.
+    #[inline]
+    fn is_far(&self, p: Point3) -> bool {
+        (p - self.center).length_squared() > self.limit
+    }
 }
 
 /// A piece of a curve that may emit.

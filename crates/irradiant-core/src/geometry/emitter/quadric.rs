@@ -86,13 +86,14 @@ impl SphereEmitter {
         self.stretch.pdf(&self.sphere.placement, n)
     }
 
-    pub(super) fn sample_area(&self, u: Point2) -> ShapeSample {
+    pub(super) fn sample_area(&self, u: Point2, wants_uv: bool) -> ShapeSample {
         let s = &self.sphere;
         let q = cut_point(s, u.x as f64, u.y as f64);
         let n_shape = scale(q, 1.0 / s.radius);
         let (p, p_error) = s.placement.point(q);
         let (n, _) = s.placement.unit_normal(n_shape);
-        ShapeSample { p, p_error, n, uv: s.uv(q), pdf: self.stretch.pdf_shape_normal(&s.placement, n_shape) }
+        let uv = if wants_uv { s.uv(q) } else { Point2::ZERO };
+        ShapeSample { p, p_error, n, uv, pdf: self.stretch.pdf_shape_normal(&s.placement, n_shape) }
     }
 
     /// From `at` to the centre, squared distance and radius, if `at` is outside a whole sphere.
@@ -106,24 +107,27 @@ impl SphereEmitter {
         (d2 > reach * reach).then_some((to, d2, center, radius))
     }
 
-    pub(super) fn sample(&self, at: &ReferencePoint, u: Point2) -> Drawn {
+    pub(super) fn sample(&self, at: &ReferencePoint, u: Point2, wants_uv: bool) -> Drawn {
         let Some((to, d2, center, radius)) = self.seen_from(at) else { return Drawn::ByArea };
-        let sin2_max = radius * radius / d2;
+        let inverse_distance = 1.0 / d2.sqrt();
+        let sin_max = radius * inverse_distance;
+        let sin2_max = sin_max * sin_max;
         let height = cone_height(sin2_max);
         let (u0, u1) = (u.x as f64, u.y);
         let one_minus_cos = height * u0;
         let sin2 = if sin2_max < SMALL_SIN2 { sin2_max * u0 } else { one_minus_cos * (2.0 - one_minus_cos) };
         let cos = (1.0 - sin2).max(0.0).sqrt();
         // Cosine of the angle at the centre between the directions to `at` and to the point.
-        let sin_max = sin2_max.sqrt();
-        let cos_alpha = (sin2 / sin_max + cos * (1.0 - sin2 / sin2_max).max(0.0).sqrt()).min(1.0);
+        let share = sin2 / sin2_max;
+        let cos_alpha = (share * sin_max + cos * (1.0 - share).max(0.0).sqrt()).min(1.0);
         let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
         let (sin_phi, cos_phi) = elementary::sin_cos(u1 * TAU);
-        let axis = scale(to, -1.0 / d2.sqrt());
+        let axis = scale(to, -inverse_distance);
         let frame = Frame::from_z(single(axis).into());
         let (x, y) = (double(frame.x.to_array()), double(frame.y.to_array()));
         let n = [0, 1, 2].map(|i| (x[i] * cos_phi as f64 + y[i] * sin_phi as f64) * sin_alpha + axis[i] * cos_alpha);
-        let n = scale(n, 1.0 / length(n));
+        // The frame is unit to a single's precision; one step of Newton's makes that a double's.
+        let n = scale(n, 1.5 - 0.5 * dot(n, n));
         let p = [0, 1, 2].map(|i| center[i] + radius * n[i]);
         let placement = &self.sphere.placement;
         let error = [0, 1, 2].map(|i| p[i].abs() as f32 * gamma(2));
@@ -132,7 +136,7 @@ impl SphereEmitter {
             p: single(p).into(),
             p_error: error.into(),
             n: single(scale(n, sign)).into(),
-            uv: self.sphere.uv(placement.point_to_shape(p)),
+            uv: if wants_uv { self.sphere.uv(placement.point_to_shape(p)) } else { Point2::ZERO },
             pdf: (1.0 / height) as f32 / TAU,
         })
     }

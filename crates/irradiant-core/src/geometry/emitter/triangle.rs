@@ -1,6 +1,6 @@
 //! Triangles: by solid angle, warped by the cosine at the receiver.
 
-use super::{Drawn, NormalCone, ShapeSample, cosine_weights};
+use super::{Drawn, Nearness, NormalCone, ShapeSample, cosine_weights};
 use crate::geometry::placement::{cross, double, length, scale, single, sub};
 use crate::geometry::triangle::{interpolate2, triangle_point};
 use crate::interaction::ReferencePoint;
@@ -8,19 +8,20 @@ use irradiant_math::warp::{SphericalTriangle, bilinear, bilinear_pdf, uniform_tr
 use irradiant_math::{Bounds3, Normal3, Point2, Point3, Vec3};
 
 /// Solid angles outside this range are sampled by area: spherical triangles lose digits when small, and BSDF sampling
-/// does better when the triangle fills half of the sky. pbrt's limits.
+/// does better when the triangle fills half of the sky. pbrt's limits; far ones are not even tried ([`Nearness`]).
 const SOLID_ANGLES: std::ops::RangeInclusive<f32> = 3e-4..=6.22;
 
 /// A triangle that may emit.
 #[derive(Clone, Debug)]
 pub struct TriangleEmitter {
-    p: [Point3; 3],
-    uvs: [[f32; 2]; 3],
+    pub(super) p: [Point3; 3],
+    pub(super) uvs: [[f32; 2]; 3],
     /// Vertex normals, which say what is outside; all zero when there are none.
     normals: [Normal3; 3],
     /// Unit; on the outer side if there are no vertex normals.
     n: Normal3,
     area: f32,
+    near: Nearness,
 }
 
 impl TriangleEmitter {
@@ -31,7 +32,8 @@ impl TriangleEmitter {
         let l = length(c);
         let sign = if flip && normals.is_none() { -1.0 } else { 1.0 };
         let n = if l > 0.0 { scale(c, sign / l) } else { [0.0, 0.0, 1.0] };
-        Self { p, uvs, normals: normals.unwrap_or([Normal3::ZERO; 3]), n: single(n).into(), area: (0.5 * l) as f32 }
+        let normals = normals.unwrap_or([Normal3::ZERO; 3]);
+        Self { p, uvs, normals, n: single(n).into(), area: (0.5 * l) as f32, near: Nearness::new(p) }
     }
 
     pub(super) fn area(&self) -> f32 {
@@ -48,7 +50,7 @@ impl TriangleEmitter {
         self.n.face_forward(ns.as_vec())
     }
 
-    pub(super) fn normal_cone(&self) -> NormalCone {
+    pub(crate) fn normal_cone(&self) -> NormalCone {
         // Vertex normals that disagree about the side leave both open.
         let sides = self.normals.map(|ns| self.n.dot_normal(ns) < 0.0);
         if sides[0] != sides[1] || sides[0] != sides[2] {
@@ -63,6 +65,7 @@ impl TriangleEmitter {
         ShapeSample { p, p_error, n: self.normal(b), uv: interpolate2(&self.uvs, b), pdf }
     }
 
+    #[inline]
     pub(super) fn sample_area(&self, u: Point2) -> ShapeSample {
         self.at(uniform_triangle(u), 1.0 / self.area)
     }
@@ -70,22 +73,25 @@ impl TriangleEmitter {
     /// The triangle on the sphere around a point, if its size there suits sampling by solid angle.
     #[inline]
     fn seen_from(&self, p: Point3) -> Option<SphericalTriangle> {
+        if self.near.is_far(p) {
+            return None;
+        }
         SphericalTriangle::new(self.p, p).filter(|s| SOLID_ANGLES.contains(&s.solid_angle()))
     }
 
     #[inline]
-    fn weights(&self, at: &ReferencePoint) -> Option<[f32; 4]> {
+    fn weights(at: &ReferencePoint, seen: &SphericalTriangle) -> Option<[f32; 4]> {
         if at.ns == Normal3::ZERO {
             return None;
         }
-        let [w0, w1, w2] = self.p.map(|p| (p - at.p).normalize());
+        let [w0, w1, w2] = seen.corners();
         // Where the corners of the square go: all of its edge u.y = 0 to vertex 1, (0,1) to vertex 0, (1,1) to vertex 2.
         Some(cosine_weights(at.ns, [w1, w1, w0, w2]))
     }
 
     pub(super) fn sample(&self, at: &ReferencePoint, u: Point2) -> Drawn {
         let Some(seen) = self.seen_from(at.p) else { return Drawn::ByArea };
-        let (u, mut pdf) = match self.weights(at) {
+        let (u, mut pdf) = match Self::weights(at, &seen) {
             Some(w) => {
                 let u = bilinear(u, w);
                 (u, bilinear_pdf(u, w))
@@ -100,7 +106,7 @@ impl TriangleEmitter {
 
     pub(super) fn pdf(&self, at: &ReferencePoint, wi: Vec3) -> Option<f32> {
         let seen = self.seen_from(at.p)?;
-        let warp = self.weights(at).map_or(1.0, |w| bilinear_pdf(seen.inverse(wi), w));
+        let warp = Self::weights(at, &seen).map_or(1.0, |w| bilinear_pdf(seen.inverse(wi), w));
         Some(warp / seen.solid_angle())
     }
 }

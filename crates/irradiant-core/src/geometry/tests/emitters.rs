@@ -18,6 +18,9 @@ fn emitters() -> Vec<(&'static str, Geometry)> {
         "trapezoid",
         shape(patch([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-0.3, 0.9, 0.0], [0.4, 1.0, 0.0]]), uneven),
     ));
+    let skew = trs(0.1, 0.3, -0.2, 40.0, [1.0, 0.5, 0.2], [1.0; 3]);
+    let corners = [[-1.0, -0.6, 0.0], [1.0, -0.6, 0.0], [1.0, 0.6, 0.0], [-1.0, 0.6, 0.0]];
+    list.push(("two triangles", shape(triangles(&corners, &[[0, 1, 2], [2, 3, 0]]), skew)));
     list.into_iter().map(|(name, s)| (name, compile(vec![emissive(s)]))).collect()
 }
 
@@ -64,7 +67,7 @@ fn areas_are_what_random_lines_say() {
     let mut rng = Rng::new(1);
     for (name, g) in emitters() {
         let e = &g.emitters()[0].geometry;
-        let drawn = Mean::of(20_000, || e.sample_area(uniform(&mut rng)).map_or(0.0, |s| 1.0 / s.pdf as f64));
+        let drawn = Mean::of(20_000, || e.sample_area(uniform(&mut rng), true).map_or(0.0, |s| 1.0 / s.pdf as f64));
         let error = (drawn.mean() / e.area() as f64 - 1.0).abs();
         assert!(error < 1e-4 + 4.5 * drawn.standard_error() / drawn.mean(), "{name}: {drawn:?} {}", e.area());
         // Uniform lines of a ball of radius 4: a uniform direction, and a uniform point of the disk across it.
@@ -103,7 +106,7 @@ fn draws_and_hits_agree() {
             let (mut met, mut off) = (0, 0);
             for _ in 0..1500 {
                 let u = uniform(&mut rng);
-                let (Some(s), Some(by_area)) = (e.sample(view, u), e.sample_area(u)) else { continue };
+                let (Some(s), Some(by_area)) = (e.sample(view, u, true), e.sample_area(u, true)) else { continue };
                 let close = |a: f32, b: f32| (a / b - 1.0).abs() < 2e-3;
                 assert!(close(e.pdf_area(by_area.p, by_area.n, by_area.uv), by_area.pdf), "{name} {by_area:?}");
                 assert!((s.n.length() - 1.0).abs() < 1e-5 && s.n.dot(cone.axis) > cone.cos_angle - 1e-4, "{name}");
@@ -219,7 +222,7 @@ fn directions_follow_the_claimed_density() {
                 let (a, b) = if n % 10 == 0 {
                     (u.x, u.y)
                 } else {
-                    let w = e.sample(view, u).map(|s| ((s.p - view.p).normalize(), s.n));
+                    let w = e.sample(view, u, true).map(|s| ((s.p - view.p).normalize(), s.n));
                     let kept = w.filter(|(w, n)| n.dot(*w).abs() > EDGE_ON);
                     share.add(f64::from(kept.is_some()));
                     let Some((w, _)) = kept else { continue };
@@ -248,7 +251,7 @@ fn draws_cover_the_solid_angle_that_rays_see() {
             let mut drawn = Mean::new();
             let mut counted = Mean::new();
             for _ in 0..60_000 {
-                let x = e.sample(view, uniform(&mut rng)).map_or(0.0, |s| {
+                let x = e.sample(view, uniform(&mut rng), true).map_or(0.0, |s| {
                     let segment = view.spawn_ray_to(s.p, s.p_error, s.n, 0.0);
                     let visible = !g.occluded_between(&segment, &NoAlphaTextures);
                     if visible { 1.0 / s.pdf as f64 } else { 0.0 }
@@ -276,7 +279,7 @@ fn solid_angle_sampling_has_no_variance() {
     for (g, exact) in [(sphere, 2.0 * pi * (1.0 - 0.75f32.sqrt())), (octant, pi / 2.0), (face, 4.0 * pi / 6.0)] {
         let e = &g.emitters()[0].geometry;
         for _ in 0..1000 {
-            let s = e.sample(&at([0.0; 3], None), uniform(&mut rng)).unwrap();
+            let s = e.sample(&at([0.0; 3], None), uniform(&mut rng), true).unwrap();
             assert!((1.0 / s.pdf / exact - 1.0).abs() < 1e-5, "{s:?} {exact}");
         }
     }
@@ -293,7 +296,7 @@ fn draws_of_a_sphere_fill_its_cone_evenly() {
         let height = sin2 / (1.0 + (1.0 - sin2).sqrt());
         for _ in 0..2000 {
             let u = uniform(&mut rng);
-            let s = e.sample(&at([0.0; 3], None), u).unwrap();
+            let s = e.sample(&at([0.0; 3], None), u, true).unwrap();
             let [x, y, z] = s.p.to_array().map(f64::from);
             // 1 - cos = sin^2 / (1 + cos), without cancellation.
             let cos = z / (x * x + y * y + z * z).sqrt();
@@ -310,7 +313,7 @@ fn hostile_views_draw_sound_samples_or_none() {
     for (name, g) in emitters() {
         let e = &g.emitters()[0].geometry;
         for _ in 0..2000 {
-            let on = e.sample_area(uniform(&mut rng)).unwrap();
+            let on = e.sample_area(uniform(&mut rng), true).unwrap();
             for view in [
                 ReferencePoint { p: on.p, p_error: on.p_error, n: on.n, ns: on.n },
                 ReferencePoint { p: on.p + on.n.as_vec() * 1e-7, p_error: Vec3::ZERO, n: on.n, ns: on.n },
@@ -320,7 +323,7 @@ fn hostile_views_draw_sound_samples_or_none() {
             ] {
                 let corners = [0.0, irradiant_math::elementary::ONE_MINUS_EPSILON, rng.next_f32()];
                 let u = Point2::new(corners[rng.next_u32() as usize % 3], corners[rng.next_u32() as usize % 3]);
-                if let Some(s) = e.sample(&view, u) {
+                if let Some(s) = e.sample(&view, u, true) {
                     assert!(s.pdf > 0.0 && s.pdf.is_finite() && s.p.is_finite() && s.n.is_finite(), "{name}: {s:?}");
                 }
                 let w = Vec3::from(rng.direction());
@@ -332,6 +335,39 @@ fn hostile_views_draw_sound_samples_or_none() {
     let g = compile(vec![emissive(curves().remove(0).1)]);
     assert_eq!(g.emitters().len(), 4);
     let e = &g.emitters()[0].geometry;
-    assert!(e.sample(&at([0.0; 3], None), Point2::ZERO).is_none() && e.sample_area(Point2::ZERO).is_none());
+    assert!(e.sample(&at([0.0; 3], None), Point2::ZERO, true).is_none() && e.sample_area(Point2::ZERO, true).is_none());
     assert!(e.area() > 0.0 && e.pdf(&at([0.0; 3], None), Vec3::X, Point3::ZERO, Normal3::ZERO, Point2::ZERO) == 0.0);
+}
+
+/// Pairs of triangles become one emitter exactly when they are a rectangle and agree about the outside; hits of both
+/// report it.
+#[test]
+fn two_triangles_of_a_rectangle_are_one_emitter() {
+    let square = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    let kite = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.1, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    let rhombus = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.5, 1.0, 1.0], [0.5, 1.0, 1.0]];
+    let bent = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 1.0, 1.001], [0.0, 1.0, 1.0]];
+    let apart = [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 1.0, 1.0], [5.0, 1.0, 1.0]];
+    let pair = [[0, 1, 2], [0, 2, 3]];
+    let cases = [
+        (square, pair, 1),
+        (square, [[2, 0, 1], [3, 0, 2]], 1),
+        (square, [[0, 1, 2], [0, 3, 2]], 2),
+        (square, [[0, 1, 2], [0, 1, 2]], 2),
+        (kite, pair, 2),
+        (rhombus, pair, 2),
+        (bent, pair, 2),
+        (apart, pair, 2),
+    ];
+    for (corners, faces, n) in cases {
+        let g = compile(vec![emissive(shape(triangles(&corners, &faces), Transform::IDENTITY))]);
+        assert_eq!(g.emitters().len(), n, "{corners:?} {faces:?}");
+        assert!(g.emitters().iter().all(|e| e.faces as usize * n == 2));
+        for (x, y, face) in [(1.9, 0.1, 0), (0.1, 0.9, 1)] {
+            let ray = Ray::new(Point3::new(x, y, 0.0), Vec3::Z, 0.0);
+            let Some(hit) = g.intersect(&ray, f32::INFINITY, &NoAlphaTextures) else { continue };
+            let light = g.interaction(&ray, &hit).light.unwrap().0;
+            assert!(n == 1 && light == 0 || n == 2 && light <= face, "{corners:?} {faces:?}");
+        }
+    }
 }

@@ -98,7 +98,7 @@ fn segments_to_emitters_are_not_blocked_by_the_emitter() {
                     let reference = ReferencePoint { p, p_error: Vec3::ZERO, n: Normal3::ZERO, ns: Normal3::ZERO };
                     let e = &g.emitters()[rng.next_u32() as usize % g.emitters().len()];
                     let u = Point2::new(rng.next_f32(), rng.next_f32());
-                    let Some(s) = e.geometry.sample(&reference, u) else { continue };
+                    let Some(s) = e.geometry.sample(&reference, u, true) else { continue };
                     let segment = reference.spawn_ray_to(s.p, s.p_error, s.n, 0.0);
                     // Only points on this side of a convex body are visible, and grazing ones may round to either.
                     let facing = -(segment.d.normalize().dot_normal(s.n));
