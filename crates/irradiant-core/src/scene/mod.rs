@@ -183,11 +183,6 @@ impl Scene {
         if value > 0.0 { value.min(1.0) } else { 0.0 }
     }
 
-    /// The pixels to render.
-    pub fn bounds(&self) -> PixelBounds {
-        self.bounds
-    }
-
     /// World from render space.
     pub fn world_from_render(&self) -> Transform {
         self.render_from_world.inverse()
