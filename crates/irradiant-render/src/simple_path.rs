@@ -66,10 +66,11 @@ impl Integrator for SimplePathIntegrator {
                             scene.lights.get(light).sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
                     {
                         let f = bsdf.f(at.wo, s.wi, TransportMode::Radiance) * s.wi.dot(bsdf.frame.z).abs();
-                        if !f.is_black() {
+                        let arriving = s.radiance * scene.opacity(&s);
+                        if !(f.is_black() || arriving.is_black()) {
                             stats.shadow_rays += 1;
                             if !scene.is_occluded(&at, &s) {
-                                radiance += throughput * f * s.radiance * (1.0 / (pmf * s.pdf));
+                                radiance += throughput * f * arriving * (1.0 / (pmf * s.pdf));
                             }
                         }
                     }
@@ -116,7 +117,11 @@ impl Integrator for SimplePathIntegrator {
     }
 
     fn limits(&self) -> Vec<Limit> {
-        self.max_depth.map(Limit::MaxDepth).into_iter().collect()
+        let depth = self.max_depth.map(Limit::MaxDepth);
+        // What chance cannot find.
+        let lights = (!self.sample_lights).then(|| Limit::Truncation("delta lights".into()));
+        let lobes = (!self.sample_bsdf).then(|| Limit::Truncation("delta lobes".into()));
+        depth.into_iter().chain(lights).chain(lobes).collect()
     }
 }
 

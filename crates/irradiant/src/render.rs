@@ -127,9 +127,8 @@ impl Job {
         let totals = film.totals();
         let mut header = self.header.clone();
         header.samples_refused = totals.not_finite + totals.out_of_range;
-        let refused = totals.not_finite + totals.out_of_range > 0;
         let wanted = header.samples_per_pixel;
-        if !refused && (totals.min_count, totals.max_count) != (wanted, wanted) {
+        if (totals.min_count, totals.max_count) != (wanted, wanted) {
             header.samples_taken = Some([totals.min_count, totals.max_count]);
         }
         Rendering { film, stats, header, variance: self.scene.layers.variance }
