@@ -258,7 +258,8 @@ fn direct_light<R: PathRecorder>(
     };
     let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);
     let f = f * sample.wi.dot(bsdf.frame.z).abs();
-    if f.is_black() || sample.radiance.is_black() {
+    let arriving = sample.radiance * scene.opacity(&sample);
+    if f.is_black() || arriving.is_black() {
         return SampledSpectrum::ZERO;
     }
     stats.shadow_rays += 1;
@@ -268,7 +269,7 @@ fn direct_light<R: PathRecorder>(
     let light_pdf = pmf * sample.pdf;
     // Weigh against the chance that the BSDF would have found this light; it never finds a delta.
     let weight = if sample.is_delta { 1.0 } else { power_heuristic(light_pdf, bsdf_pdf) };
-    let radiance = *throughput * f * sample.radiance * (weight / light_pdf);
+    let radiance = *throughput * f * arriving * (weight / light_pdf);
     recorder.contribution(&Contribution {
         bounces: depth + 1,
         technique: Technique::LightSample,

@@ -5,6 +5,7 @@ use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::film::FilmTile;
+use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::light::SampleMode;
 use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::scene::Scene;
@@ -30,6 +31,7 @@ impl Integrator for SimplePathIntegrator {
             let mut radiance = SampledSpectrum::ZERO;
             let mut throughput = SampledSpectrum::ONE;
             let mut count_emission = true;
+            let mut previous: Option<ReferencePoint> = None;
             let mut depth = 0;
             loop {
                 let Some(hit) = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha()) else {
@@ -39,7 +41,12 @@ impl Integrator for SimplePathIntegrator {
                     break;
                 };
                 let at = scene.geometry.interaction(&ray, &hit);
-                if let (true, Some(light)) = (count_emission, at.light) {
+                // A light that samples cannot draw (a curve) counts whenever it is met.
+                let drawable = |light| match &previous {
+                    Some(p) => scene.lights.get(light).pdf_hit(p, ray.d, &(&at).into()) > 0.0,
+                    None => false,
+                };
+                if let Some(light) = at.light.filter(|&l| count_emission || !drawable(l)) {
                     radiance += throughput * scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
@@ -66,10 +73,11 @@ impl Integrator for SimplePathIntegrator {
                             scene.lights.get(light).sample(&at.reference(), draws.uv, lambda, SampleMode::Complete)
                     {
                         let f = bsdf.f(at.wo, s.wi, TransportMode::Radiance) * s.wi.dot(bsdf.frame.z).abs();
-                        if !f.is_black() {
+                        let arriving = s.radiance * scene.opacity(&s);
+                        if !(f.is_black() || arriving.is_black()) {
                             stats.shadow_rays += 1;
                             if !scene.is_occluded(&at, &s) {
-                                radiance += throughput * f * s.radiance * (1.0 / (pmf * s.pdf));
+                                radiance += throughput * f * arriving * (1.0 / (pmf * s.pdf));
                             }
                         }
                     }
@@ -108,6 +116,7 @@ impl Integrator for SimplePathIntegrator {
                     }
                     throughput *= 1.0 / survival;
                 }
+                previous = Some(at.reference());
                 ray = at.spawn_ray(wi);
                 stats.bounce_rays += 1;
             }
@@ -116,7 +125,11 @@ impl Integrator for SimplePathIntegrator {
     }
 
     fn limits(&self) -> Vec<Limit> {
-        self.max_depth.map(Limit::MaxDepth).into_iter().collect()
+        let depth = self.max_depth.map(Limit::MaxDepth);
+        // What chance cannot find.
+        let lights = (!self.sample_lights).then(|| Limit::Truncation("delta lights".into()));
+        let lobes = (!self.sample_bsdf).then(|| Limit::Truncation("delta lobes".into()));
+        depth.into_iter().chain(lights).chain(lobes).collect()
     }
 }
 

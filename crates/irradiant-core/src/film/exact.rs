@@ -63,7 +63,7 @@ impl ExactSum {
     /// The sum, rounded to `f64`.
     #[inline]
     pub fn value(self) -> f64 {
-        self.0 as f64 * (-64f64).exp2()
+        self.0 as f64 / (1u128 << 64) as f64
     }
 }
 
@@ -96,7 +96,7 @@ impl SquareSum {
     /// The sum, rounded to `f64`.
     #[inline]
     pub fn value(self) -> f64 {
-        self.0 as f64 * (-48f64).exp2()
+        self.0 as f64 / (1u64 << 48) as f64
     }
 }
 

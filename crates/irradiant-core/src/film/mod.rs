@@ -268,9 +268,9 @@ pub struct FilmTotals {
     pub out_of_range: u64,
     /// Pixels with at least one refused sample.
     pub pixels_with_refused: u64,
-    /// Fewest samples in a pixel.
+    /// Fewest samples taken of a pixel, refused ones included.
     pub min_count: u32,
-    /// Most samples in a pixel.
+    /// Most samples taken of a pixel, refused ones included.
     pub max_count: u32,
     /// Mean standard error of a pixel over the mean of the picture, estimated as if samples were independent.
     pub relative_error: f64,
@@ -357,8 +357,9 @@ impl Film {
             totals.not_finite += pixel.not_finite as u64;
             totals.out_of_range += pixel.out_of_range as u64;
             totals.pixels_with_refused += u64::from(pixel.not_finite + pixel.out_of_range > 0);
-            totals.min_count = totals.min_count.min(pixel.count);
-            totals.max_count = totals.max_count.max(pixel.count);
+            let taken = pixel.count + pixel.not_finite + pixel.out_of_range;
+            totals.min_count = totals.min_count.min(taken);
+            totals.max_count = totals.max_count.max(taken);
             mean += pixel.mean().iter().sum::<f64>();
             let known = pixel.variance().into_iter().filter(|v| v.is_finite());
             error += known.map(|v| (v / pixel.count.max(1) as f64).sqrt()).sum::<f64>();

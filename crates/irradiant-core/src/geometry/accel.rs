@@ -161,18 +161,7 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
 }
 
 fn context(p: Point3, n: Vec3, uv: Point2, face: u32) -> TextureContext {
-    TextureContext {
-        p,
-        n: n.normalize().as_normal(),
-        uv,
-        dpdx: Vec3::ZERO,
-        dpdy: Vec3::ZERO,
-        dudx: 0.0,
-        dudy: 0.0,
-        dvdx: 0.0,
-        dvdy: 0.0,
-        face,
-    }
+    TextureContext::without_footprint(p, n.normalize().as_normal(), uv, face)
 }
 
 impl<A: AlphaTextures> GroupLeaves<'_, A> {

@@ -254,7 +254,7 @@ impl SampleStream<'_> {
                 ]
             }
             Source::Halton { index, seed, randomization } => std::array::from_fn(|d| {
-                let dimension = (4 * block) as usize + d;
+                let dimension = 4 * block as usize + d;
                 if dimension >= PRIMES.len() {
                     return owen_sobol_4d(index, mix32(seed ^ block.wrapping_mul(0x9e37_79b9)))[d];
                 }
@@ -273,7 +273,7 @@ impl SampleStream<'_> {
                 .min(ONE_MINUS)
             }),
             Source::Global { index, pixel, log2_size, fallback, randomization } => std::array::from_fn(|d| {
-                let dimension = (4 * block) as usize + d;
+                let dimension = 4 * block as usize + d;
                 if dimension >= N_SOBOL_DIMENSIONS {
                     return owen_sobol_4d(fallback.0, mix32(fallback.1 ^ block.wrapping_mul(0x9e37_79b9)))[d];
                 }

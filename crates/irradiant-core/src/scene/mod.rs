@@ -16,12 +16,12 @@ use crate::film::filter::Filter;
 use crate::film::{Film, PixelBounds};
 use crate::geometry::{AlphaTextures, Geometry};
 use crate::interaction::{Interaction, MaterialId, TextureContext};
-use crate::light::{LightSample, LightTarget, Lights};
+use crate::light::{AlphaAt, LightSample, LightTarget, Lights};
 use crate::light_sampler::LightSampler;
 use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
-use irradiant_math::{Normal3, Point2, Transform, Vec3};
+use irradiant_math::{Normal3, Point2, Point3, Transform, Vec3};
 use irradiant_scene::desc::FloatTextureRef;
 use irradiant_spectrum::{Basis, ColorSpace, SampledSpectrum, Sensor, Spectrum, Wavelengths};
 
@@ -158,6 +158,29 @@ impl Scene {
                 self.geometry.occluded_between(&at.spawn_ray_to(p, p_error, n), &self.alpha())
             }
         }
+    }
+
+    /// How much of a light sample is there, in [0, 1]: the light's opacity where that is a texture, which lights do not
+    /// know; else 1. (A constant opacity is in the sample's radiance already.)
+    #[inline]
+    pub fn opacity(&self, sample: &LightSample) -> f32 {
+        match sample.alpha {
+            None => 1.0,
+            Some(alpha) => self.textured_opacity(alpha, sample.target),
+        }
+    }
+
+    #[cold]
+    fn textured_opacity(&self, alpha: AlphaAt, target: LightTarget) -> f32 {
+        let (p, n) = match target {
+            LightTarget::Surface { p, n, .. } => (p, n),
+            LightTarget::Point(p) => (p, Normal3::ZERO),
+            LightTarget::Infinite => (Point3::ZERO, Normal3::ZERO),
+        };
+        let at = TextureContext::without_footprint(p, n, alpha.uv, 0);
+        // As rays see it: what is not more than 0 is not there.
+        let value = self.alpha().alpha(alpha.texture, &at);
+        if value > 0.0 { value.min(1.0) } else { 0.0 }
     }
 
     /// World from render space.

@@ -4,7 +4,7 @@ mod worker;
 
 use crate::integrator::{Integrator, RenderStats};
 use crate::schedule::Schedule;
-use irradiant_core::film::{Film, FilmTotals};
+use irradiant_core::film::{Film, FilmTotals, PixelBounds};
 use irradiant_core::scene::Scene;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -96,7 +96,7 @@ impl Session {
             cancelled: AtomicBool::new(false),
             samples_done: AtomicU64::new(0),
             started,
-            deadline: settings.time_limit.map(|limit| started + limit),
+            deadline: settings.time_limit.and_then(|limit| started.checked_add(limit)),
             film: Mutex::new(film),
             stats: Mutex::new(RenderStats::default()),
         });
@@ -104,15 +104,16 @@ impl Session {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             n => n,
         };
-        let workers = (0..threads)
-            .map(|i| {
+        let workers: Vec<_> = (0..threads)
+            .filter_map(|i| {
                 let shared = Arc::clone(&shared);
-                std::thread::Builder::new()
-                    .name(format!("render {i}"))
-                    .spawn(move || worker::work(&shared))
-                    .unwrap_or_else(|why| panic!("the system refuses a thread: {why}"))
+                // Where the system refuses a thread those that started do the work.
+                std::thread::Builder::new().name(format!("render {i}")).spawn(move || worker::work(&shared)).ok()
             })
             .collect();
+        if workers.is_empty() {
+            worker::work(&shared);
+        }
         Self { shared, workers }
     }
 
@@ -147,7 +148,9 @@ impl Session {
         for worker in self.workers.drain(..) {
             worker_panicked |= worker.join().is_err();
         }
-        let film = lock(&self.shared.film).clone();
+        // Taken, not copied: films are big.
+        let nothing = Film::new([0, 0], PixelBounds { x0: 0, y0: 0, x1: 0, y1: 0 }, Vec::new());
+        let film = std::mem::replace(&mut *lock(&self.shared.film), nothing);
         let stats = lock(&self.shared.stats).clone();
         Finished { film, stats, worker_panicked }
     }

@@ -1,0 +1,171 @@
+//! Small pictures as numbers with error bars, and what it takes for two of them to agree.
+//!
+//! Scenes render with the `independent` sampler and the box filter, so that the film's own variances are exact standard
+//! errors. Two pictures agree when no channel's mean over the picture, and no 4 by 4 tile of it, is further off than
+//! chance allows: 4.9 joint standard errors for a mean (two-sided 1e-6), 1e-6 over all tiles together (Sidak). Each call
+//! asserts its own power: the bias of the mean that would be seen with a chance of 98 % (6.9 standard errors).
+
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use irradiant::{ColorMode, IntegratorChoice, MaxDepth, RenderSettings, load_text, render};
+use irradiant_testkit::Tiles;
+
+/// Standard errors that a right program exceeds with chance 1e-6.
+pub const SIGMAS: f64 = 4.9;
+
+/// How to estimate.
+#[derive(Clone, Copy)]
+pub struct How {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Of the random numbers; estimates to be compared must differ in it.
+    pub seed: u64,
+    /// Instead of the scene's.
+    pub integrator: Option<IntegratorChoice>,
+    /// Instead of the scene's.
+    pub max_depth: MaxDepth,
+    /// Basis.
+    pub color: ColorMode,
+}
+
+impl How {
+    /// By the scene's own integrator without depth limit, in RGB.
+    pub fn new(spp: u32, seed: u64) -> Self {
+        Self { spp, seed, integrator: None, max_depth: MaxDepth::None, color: ColorMode::Rgb }
+    }
+
+    /// With another integrator.
+    pub fn by(self, integrator: IntegratorChoice) -> Self {
+        Self { integrator: Some(integrator), ..self }
+    }
+
+    /// With a depth limit.
+    pub fn depth(self, limit: u32) -> Self {
+        Self { max_depth: MaxDepth::Limit(limit), ..self }
+    }
+
+    /// With wavelengths.
+    pub fn spectral(self) -> Self {
+        Self { color: ColorMode::Spectral, ..self }
+    }
+
+    /// As the library wants it.
+    pub fn settings(&self) -> RenderSettings {
+        RenderSettings {
+            samples_per_pixel: Some(self.spp),
+            seed: Some(self.seed),
+            integrator: self.integrator,
+            max_depth: Some(self.max_depth),
+            color: self.color,
+            threads: 1,
+            ..RenderSettings::default()
+        }
+    }
+}
+
+/// A picture of means with the variances of these means.
+pub struct Estimate {
+    /// Pixels per row.
+    pub width: usize,
+    /// Linear RGB.
+    pub mean: Vec<[f64; 3]>,
+    /// Of each of `mean`.
+    pub variance: Vec<[f64; 3]>,
+    /// Scattering events on the longest path.
+    pub longest_path: u32,
+}
+
+/// A film of `size` by `size` pixels whose variances are exact.
+pub fn film(size: u32) -> String {
+    format!(
+        "Film \"rgb\" \"integer xresolution\" {size} \"integer yresolution\" {size}\nPixelFilter \"box\"\nSampler \"independent\"\n"
+    )
+}
+
+/// Renders; no sample may be refused.
+pub fn estimate(scene: &str, how: How) -> Estimate {
+    let file = load_text("test", scene, ".").unwrap_or_else(|e| panic!("{e}\n{scene}"));
+    let rendering = render(&file, &how.settings()).unwrap_or_else(|e| panic!("{e}\n{scene}"));
+    assert_eq!(rendering.header.samples_refused, 0, "refused samples: {:?}", rendering.stats.refused);
+    let bounds = rendering.film.bounds();
+    let (mut mean, mut variance) = (vec![], vec![]);
+    for y in bounds.y0..bounds.y1 {
+        for x in bounds.x0..bounds.x1 {
+            let pixel = rendering.film.pixel(x, y);
+            assert_eq!((pixel.count, pixel.square_overflow), (how.spp, 0));
+            mean.push(pixel.mean());
+            variance.push(pixel.variance().map(|v| v / f64::from(how.spp)));
+        }
+    }
+    Estimate { width: bounds.width(), mean, variance, longest_path: rendering.stats.longest_path }
+}
+
+impl Estimate {
+    /// Mean over the picture and its standard error, by channel.
+    pub fn total(&self) -> [(f64, f64); 3] {
+        let n = self.mean.len() as f64;
+        std::array::from_fn(|c| {
+            let mean = self.mean.iter().map(|p| p[c]).sum::<f64>() / n;
+            (mean, self.variance.iter().map(|p| p[c]).sum::<f64>().sqrt() / n)
+        })
+    }
+
+    fn channel(&self, c: usize) -> (Vec<f64>, Vec<f64>) {
+        (self.mean.iter().map(|p| p[c]).collect(), self.variance.iter().map(|p| p[c]).collect())
+    }
+}
+
+/// Panics unless two estimates agree and a bias of `power` (relative, of any channel's mean) would have been seen.
+#[track_caller]
+pub fn assert_agree(a: &Estimate, b: &Estimate, power: f64, what: &str) {
+    for (c, (x, y)) in a.total().into_iter().zip(b.total()).enumerate() {
+        let se = x.1.hypot(y.1);
+        let visible = (SIGMAS + 2.0) * se / y.0.abs();
+        assert!(visible <= power, "{what}: only a bias of {:.2} % would be seen in channel {c}", 100.0 * visible);
+        assert!(
+            (x.0 - y.0).abs() <= SIGMAS * se + 1e-6 * y.0.abs(),
+            "{what}: channel {c} is {} +- {} and {} +- {}: z {:.2}",
+            x.0,
+            x.1,
+            y.0,
+            y.1,
+            (x.0 - y.0) / se
+        );
+        let ((image_a, variance_a), (image_b, variance_b)) = (a.channel(c), b.channel(c));
+        let report = Tiles {
+            width: a.width,
+            a: &image_a,
+            variance_a: &variance_a,
+            b: &image_b,
+            variance_b: &variance_b,
+            tile: 4,
+            slack: 1e-6,
+        }
+        .compare(1e-6)
+        .expect("pictures of one size");
+        assert!(report.failed.is_empty(), "{what}: tiles {:?} of channel {c} are off: z {:?}", report.failed, report.z);
+    }
+}
+
+/// Panics unless every channel's mean is `expected` and a bias of `power` (relative) would have been seen.
+#[track_caller]
+pub fn assert_is(a: &Estimate, expected: [f64; 3], power: f64, what: &str) {
+    for (c, (mean, se)) in a.total().into_iter().enumerate() {
+        let visible = (SIGMAS + 2.0) * se / expected[c].abs();
+        assert!(visible <= power, "{what}: only a bias of {:.2} % would be seen in channel {c}", 100.0 * visible);
+        // f32 transport rounds by some 1e-6.
+        let allowed = SIGMAS * se + 1e-5 * expected[c].abs();
+        assert!(
+            (mean - expected[c]).abs() <= allowed,
+            "{what}: channel {c} is {mean} +- {se}, expected {}: z {:.2}",
+            expected[c],
+            (mean - expected[c]) / se
+        );
+    }
+}
+
+/// A quadrilateral as two triangles.
+pub fn quad(p: [[f32; 3]; 4]) -> String {
+    let list = p.iter().flatten().map(f32::to_string).collect::<Vec<_>>().join(" ");
+    format!("Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 2 3 0 ] \"point3 P\" [ {list} ]\n")
+}
