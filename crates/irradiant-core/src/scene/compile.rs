@@ -134,6 +134,9 @@ fn compile(
     let facts = facts(desc, &geometry, &materials, &textures, &lights);
     let truncations = materials.coat_depth_limit().map(|n| format!("coat depth {n}")).into_iter().collect();
     let mut biases = Vec::new();
+    if materials.uses_pbrt_coat_weights() {
+        biases.push("coats weighted as in pbrt-v4".into());
+    }
     if film.max_component_value.is_finite() {
         biases.push(format!("maxcomponentvalue {}", film.max_component_value.value));
     }
