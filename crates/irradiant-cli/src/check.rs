@@ -1,6 +1,7 @@
 //! `irradiant check`: what a scene holds, and what will not be honoured.
 
 use crate::exit::Exit;
+use crate::say::say;
 use clap::Args;
 use irradiant::{Job, RenderSettings};
 use std::path::PathBuf;
@@ -33,7 +34,7 @@ pub fn run(arguments: &CheckArguments) -> Exit {
     };
     let facts = job.scene.facts();
     println!("{}", file.name);
-    let bounds = job.scene.new_film().bounds();
+    let bounds = job.scene.bounds();
     println!(
         "  film         {} x {} pixels, {} samples each",
         bounds.width(),
@@ -79,7 +80,7 @@ fn explain(code: &str) -> Exit {
             Exit::Ok
         }
         None => {
-            eprintln!("there is no diagnostic {code}");
+            say!("there is no diagnostic {code}");
             Exit::Usage
         }
     }

@@ -1,6 +1,7 @@
 //! `irradiant compare`: how two pictures differ.
 
 use crate::exit::Exit;
+use crate::say::say;
 use clap::Args;
 use irradiant::image::metrics::CompareError;
 use irradiant::image::{
@@ -27,11 +28,11 @@ pub fn run(arguments: &CompareArguments) -> Exit {
         (Ok(a), Ok(b)) => (a, b),
         (Err(exit), _) | (_, Err(exit)) => return exit,
     };
-    let measured = compare(&a, &b).and_then(|c| Ok((c, flip(&a, &b, &arguments.a)?)));
+    let measured = compare(&a, &b).and_then(|c| Ok((c, flip(&a, &b, [&arguments.a, &arguments.b])?)));
     let (c, flip) = match measured {
         Ok(measured) => measured,
         Err(why) => {
-            eprintln!("cannot compare {} with {}: {why}", arguments.a.display(), arguments.b.display());
+            say!("cannot compare {} with {}: {why}", arguments.a.display(), arguments.b.display());
             return Exit::BadInput;
         }
     };
@@ -58,13 +59,15 @@ pub fn run(arguments: &CompareArguments) -> Exit {
     Exit::Ok
 }
 
-/// Mean FLIP difference: of displays for 8-bit pictures, of high dynamic range for others.
-fn flip(a: &Image, b: &Image, name: &Path) -> Result<f64, CompareError> {
+/// Mean FLIP difference: of displays for two pictures of display formats, else of high dynamic range.
+fn flip(a: &Image, b: &Image, names: [&Path; 2]) -> Result<f64, CompareError> {
     let options = FlipOptions::default();
-    let display = matches!(
-        FileFormat::from_name(&name.to_string_lossy()),
-        Some(FileFormat::Png | FileFormat::Jpeg | FileFormat::Qoi | FileFormat::Bmp | FileFormat::Tga)
-    );
+    let display = names.iter().all(|name| {
+        matches!(
+            FileFormat::from_name(&name.to_string_lossy()),
+            Some(FileFormat::Png | FileFormat::Jpeg | FileFormat::Qoi | FileFormat::Bmp | FileFormat::Tga)
+        )
+    });
     let flip = if display { flip_ldr(a, b, &options)? } else { flip_hdr(a, b, &options)? };
     Ok(flip.mean)
 }
@@ -74,7 +77,7 @@ pub fn open(path: &Path) -> Result<Image, Exit> {
     match read_file(path, &ReadOptions::default()) {
         Ok(image) => Ok(image),
         Err(why) => {
-            eprintln!("{}: {why}", path.display());
+            say!("{}: {why}", path.display());
             let missing = matches!(&why, ImageError::Io { error, .. } if error.kind() == std::io::ErrorKind::NotFound);
             Err(if missing { Exit::Missing } else { Exit::BadInput })
         }

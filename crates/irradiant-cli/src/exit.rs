@@ -1,5 +1,7 @@
 //! Exit codes, after sysexits.h where it has one.
 
+use crate::say::say;
+
 /// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -22,7 +24,7 @@ impl Exit {
     /// The code for an error, after printing it to standard error.
     pub fn of(error: &irradiant::Error) -> Self {
         use irradiant::Error;
-        eprintln!("{error}");
+        say!("{error}");
         match error {
             Error::Scene(report) if report.only_missing_files() => Self::Missing,
             Error::Scene(_) => Self::BadInput,

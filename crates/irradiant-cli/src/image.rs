@@ -2,6 +2,8 @@
 
 use crate::compare::open;
 use crate::exit::Exit;
+use crate::options::parse_exposure;
+use crate::say::say;
 use clap::Args;
 use irradiant::image::{FileFormat, ToneCurve, ToneOptions, atomic_write, to_srgb8, write};
 use std::path::PathBuf;
@@ -15,7 +17,7 @@ pub struct ImageArguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Brighten by this many stops
-    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
     /// Curve from scene to display
     #[arg(long, value_enum, default_value = "none")]
@@ -39,7 +41,7 @@ pub fn run(arguments: &ImageArguments) -> Exit {
         Err(exit) => return exit,
     };
     let Some(format) = FileFormat::from_name(&arguments.output.to_string_lossy()) else {
-        eprintln!("{}: unknown kind of picture; known are .exr .png .pfm .hdr .qoi .jpg", arguments.output.display());
+        say!("{}: unknown kind of picture; known are .exr .png .pfm .hdr .qoi .jpg", arguments.output.display());
         return Exit::Usage;
     };
     let curve = match arguments.tone {
@@ -55,7 +57,7 @@ pub fn run(arguments: &ImageArguments) -> Exit {
     match converted.and_then(|i| write(&i, format)).and_then(|bytes| atomic_write(&arguments.output, &bytes)) {
         Ok(()) => Exit::Ok,
         Err(why) => {
-            eprintln!("cannot write {}: {why}", arguments.output.display());
+            say!("cannot write {}: {why}", arguments.output.display());
             Exit::Output
         }
     }

@@ -9,10 +9,12 @@ mod options;
 mod probe;
 mod progress;
 mod render;
+mod say;
 mod stats;
 
 use clap::{Parser, Subcommand};
 use exit::Exit;
+use say::say;
 use std::process::ExitCode;
 
 /// Physically based path tracing: right, and provably so.
@@ -38,8 +40,17 @@ fn main() -> ExitCode {
     // Every bug that panics is reported as one, with its own exit code.
     let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
+        // But not that standard output cannot be written: whoever read it has left (`| head`), or a disk is full.
+        if let Some(why) = info.payload().downcast_ref::<String>()
+            && why.starts_with("failed printing to stdout")
+        {
+            if !why.contains("Broken pipe") {
+                say!("irradiant: {why}");
+            }
+            std::process::exit(Exit::Output as i32);
+        }
         default_hook(info);
-        eprintln!("irradiant: this is a bug; please report it with the scene and the command");
+        say!("irradiant: this is a bug; please report it with the scene and the command");
     }));
     let arguments = Arguments::parse();
     let run = || match arguments.command {

@@ -115,6 +115,15 @@ fn parse_max_depth(text: &str) -> Result<MaxDepth, String> {
     }
 }
 
+/// Stops.
+pub fn parse_exposure(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(ev) if ev.abs() <= 64.0 => Ok(ev),
+        Ok(_) => Err("must be between -64 and 64".into()),
+        Err(_) => Err("not a number".into()),
+    }
+}
+
 /// `90`, `90s`, `1.5m`, `2h`, `500ms`.
 pub fn parse_duration(text: &str) -> Result<Duration, String> {
     let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
@@ -128,7 +137,7 @@ pub fn parse_duration(text: &str) -> Result<Duration, String> {
         other => return Err(format!("\"{other}\" is not a unit of time; use ms, s, m or h")),
     };
     if !(seconds > 0.0 && seconds < 1e9) {
-        return Err("must be more than zero".into());
+        return Err("must be more than zero and less than 30 years".into());
     }
     Ok(Duration::from_secs_f64(seconds))
 }

@@ -51,7 +51,7 @@ fn probe(arguments: &ProbeArguments) -> Result<(), Error> {
     };
     let job = Job::new(&file, &arguments.picture.settings())?;
     let scene = &job.scene;
-    let bounds = scene.new_film().bounds();
+    let bounds = scene.bounds();
     let Pixel([x, y]) = arguments.pixel;
     if !bounds.contains(x, y) {
         return Err(Error::Settings(format!(

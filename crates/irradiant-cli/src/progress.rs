@@ -1,5 +1,6 @@
 //! How far a render is: a bar on a terminal, plain lines elsewhere, nothing when asked for quiet.
 
+use crate::say::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use irradiant::renderer::Progress;
 use std::io::IsTerminal;
@@ -58,7 +59,7 @@ impl Reporter {
             Self::Lines { next, last } => {
                 let due = progress.elapsed.saturating_sub(*last) > Duration::from_secs(30);
                 if (progress.fraction() >= *next && progress.fraction() < 1.0) || due {
-                    eprintln!("{:3.0} %  {}", 100.0 * progress.fraction(), text());
+                    say!("{:3.0} %  {}", 100.0 * progress.fraction(), text());
                     *last = progress.elapsed;
                     while *next <= progress.fraction() {
                         *next += 0.1;

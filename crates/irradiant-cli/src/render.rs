@@ -1,11 +1,13 @@
 //! `irradiant render`: a scene in, a picture out.
 
 use crate::exit::Exit;
-use crate::options::{PictureOptions, parse_duration};
+use crate::options::{Color, PictureOptions, parse_duration, parse_exposure};
 use crate::progress::{Reporter, short_count, short_time};
+use crate::say::say;
 use crate::stats::Clock;
 use clap::Args;
-use irradiant::{Error, Job, Rendering, SceneFile};
+use irradiant::image::FileFormat;
+use irradiant::{Error, Job, MaxDepth, Rendering, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,7 +19,7 @@ pub struct RenderArguments {
     /// Scene file
     scene: Option<PathBuf>,
     /// Picture to write; the kind follows from the extension: .exr .png .pfm .hdr .qoi .jpg. May be given several times
-    /// [default: the scene's own name, as .exr and .png, in the current directory]
+    /// [default: the base name of the scene's film, as .exr and .png, in the current directory]
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -37,17 +39,9 @@ pub struct RenderArguments {
     /// Write seconds, CPU seconds, rays, memory as JSON
     #[arg(long, value_name = "FILE.json")]
     stats: Option<PathBuf>,
-    /// Say nothing but errors
+    /// Say nothing but errors and refused samples
     #[arg(short, long)]
     quiet: bool,
-}
-
-fn parse_exposure(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(ev) if ev.abs() <= 64.0 => Ok(ev),
-        Ok(_) => Err("must be between -64 and 64".into()),
-        Err(_) => Err("not a number".into()),
-    }
 }
 
 /// Loads, renders, writes.
@@ -78,11 +72,11 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     let job = Job::new(&file, &settings)?;
     clock.lap("compile");
     if !arguments.quiet && !job.report.diagnostics.is_empty() {
-        eprintln!("{}", job.report);
+        say!("{}", job.report);
     }
     if !arguments.quiet {
-        let bounds = job.scene.new_film().bounds();
-        eprintln!(
+        let bounds = job.scene.bounds();
+        say!(
             "{}: {} x {} pixels, {} samples each, {}",
             file.name,
             bounds.width(),
@@ -92,10 +86,21 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
         );
     }
 
-    let rendering = watch(&job, arguments.quiet)?;
+    let Watched { rendering, worker_panicked } = watch(&job, arguments.quiet);
     clock.lap("render");
+    // One that cannot be written must not cost the others.
+    let mut failed = None;
     for path in &outputs {
-        rendering.save_exposed(path, arguments.exposure)?;
+        if let Err(why) = rendering.save_exposed(path, arguments.exposure) {
+            if failed.is_none() {
+                failed = Some(why);
+            } else {
+                say!("{why}");
+            }
+        }
+    }
+    if let Some(why) = failed {
+        return Err(why);
     }
     clock.lap("write");
 
@@ -107,17 +112,20 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
         irradiant::image::atomic_write(path, text.as_bytes())
             .map_err(|why| Error::Output { path: path.clone(), why })?;
     }
-    report_refused(&rendering);
+    report_refused(&rendering, arguments);
     if !arguments.quiet {
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         let (seconds, cpu) = clock.total();
-        eprintln!(
+        say!(
             "wrote {} ({}, {:.1} CPU s, {}paths/s)",
             names.join(", "),
             short_time(Duration::from_secs_f64(seconds)),
             cpu,
             short_count(rendering.stats.paths as f64 / clock.seconds("render").max(1e-9))
         );
+    }
+    if worker_panicked {
+        return Err(Error::Internal("a render thread stopped; the picture was written without its last tile".into()));
     }
     Ok(())
 }
@@ -129,8 +137,15 @@ fn job_threads(arguments: &RenderArguments) -> usize {
     }
 }
 
+/// What rendering left.
+struct Watched {
+    rendering: Rendering,
+    /// A bug: the picture lacks what that worker had under way.
+    worker_panicked: bool,
+}
+
 /// Renders with progress; Ctrl-C ends early with the picture so far, a second one at once.
-fn watch(job: &Job, quiet: bool) -> Result<Rendering, Error> {
+fn watch(job: &Job, quiet: bool) -> Watched {
     let interrupts = Arc::new(AtomicU32::new(0));
     let counter = Arc::clone(&interrupts);
     // A handler that cannot be set (there is one already, in an embedding process) only means no early picture.
@@ -155,16 +170,13 @@ fn watch(job: &Job, quiet: bool) -> Result<Rendering, Error> {
         if !interrupted && interrupts.load(Ordering::Relaxed) > 0 {
             interrupted = true;
             session.cancel();
-            eprintln!("stopping; writing the picture so far (Ctrl-C again quits without it)");
+            say!("stopping; writing the picture so far (Ctrl-C again quits without it)");
         }
         std::thread::sleep(Duration::from_millis(if progress.elapsed.as_millis() < 500 { 2 } else { 25 }));
     }
     reporter.finish();
     let finished = session.wait();
-    if finished.worker_panicked {
-        return Err(Error::Internal("a render thread stopped; please report the scene and the command".into()));
-    }
-    Ok(job.rendering(finished.film, finished.stats))
+    Watched { rendering: job.rendering(finished.film, finished.stats), worker_panicked: finished.worker_panicked }
 }
 
 /// Where to write: as asked for, else the scene's own name in the current directory, EXR and PNG.
@@ -172,7 +184,7 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
     let paths = if arguments.output.is_empty() {
         let named = file.desc.film.filename.as_ref().map(|f| f.value.clone());
         let stem = named.as_deref().map(Path::new).and_then(Path::file_stem);
-        let from_scene = arguments.scene.as_deref().and_then(Path::file_stem);
+        let from_scene = arguments.scene.as_deref().and_then(Path::file_stem).filter(|s| *s != "-");
         let stem = stem.or(from_scene).map_or("irradiant".into(), |s| s.to_string_lossy().into_owned());
         vec![PathBuf::from(format!("{stem}.exr")), PathBuf::from(format!("{stem}.png"))]
     } else {
@@ -180,13 +192,17 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
     };
     // Tell now, not after hours of rendering.
     for path in &paths {
-        if irradiant::image::FileFormat::from_name(&path.to_string_lossy()).is_none() {
+        let known = FileFormat::from_name(&path.to_string_lossy());
+        if known.is_none_or(|f| matches!(f, FileFormat::Tga | FileFormat::Bmp)) {
             return Err(Error::Settings(format!(
-                "--output {}: unknown kind of picture; known are .exr .png .pfm .hdr .qoi .jpg",
+                "--output {}: not a kind of picture that can be written; these can: .exr .png .pfm .hdr .qoi .jpg",
                 path.display()
             )));
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if path.is_dir() {
+            return Err(Error::Settings(format!("--output {}: is a folder", path.display())));
+        }
         if !folder.is_dir() {
             return Err(Error::Settings(format!(
                 "--output {}: there is no folder {}",
@@ -199,18 +215,39 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
 }
 
 /// Refused samples are never hidden: how many, and where the first ones are.
-fn report_refused(rendering: &Rendering) {
+fn report_refused(rendering: &Rendering, arguments: &RenderArguments) {
     let totals = rendering.film.totals();
     let refused = totals.not_finite + totals.out_of_range;
     if refused == 0 {
         return;
     }
-    eprintln!(
+    say!(
         "warning: {refused} of {} samples were not finite or out of range and are left out of the means, in {} pixels; replay the first with",
         totals.samples + refused,
         totals.pixels_with_refused
     );
+    let scene = arguments.scene.as_deref().map_or(String::new(), |p| format!("{} ", p.display()));
+    let flags = replay_flags(rendering, arguments);
     for (x, y, index) in rendering.stats.refused.iter().take(3) {
-        eprintln!("    irradiant probe SCENE --pixel {x},{y} --sample {index}");
+        say!("    irradiant probe {scene}--pixel {x},{y} --sample {index}{flags}");
     }
+}
+
+/// What `probe` must be told to draw the samples of this render.
+fn replay_flags(rendering: &Rendering, arguments: &RenderArguments) -> String {
+    let picture = &arguments.picture;
+    let mut flags = format!(" --spp {} --seed {}", rendering.header.samples_per_pixel, rendering.header.seed);
+    if picture.resolution.is_some() || arguments.preview {
+        let [width, height] = rendering.film.full_resolution();
+        flags += &format!(" --resolution {width}x{height}");
+    }
+    match picture.max_depth {
+        Some(MaxDepth::None) => flags += " --max-depth none",
+        Some(MaxDepth::Limit(n)) => flags += &format!(" --max-depth {n}"),
+        None => {}
+    }
+    if matches!(picture.color, Color::Rgb) {
+        flags += " --color rgb";
+    }
+    flags
 }

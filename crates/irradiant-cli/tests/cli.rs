@@ -1,6 +1,6 @@
 //! The program as a user drives it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 /// A folder of its own for each test, removed at the end.
@@ -100,8 +100,11 @@ fn equal_pixels_are_equal_files_for_any_number_of_threads() {
     }
     let read = |name: &str| std::fs::read(folder.0.join(name)).expect("written");
     assert_eq!(read("a.exr"), read("b.exr"));
-    folder.run(&[&["render", "--seed", "9", "-o", "c.exr"], &SMALL[..]].concat());
-    assert_ne!(read("a.exr"), read("c.exr"));
+    // Another seed is another picture, not only another header.
+    for (seed, name) in [("0", "a.pfm"), ("9", "c.pfm")] {
+        folder.run(&[&["render", "--seed", seed, "-o", name], &SMALL[..]].concat());
+    }
+    assert_ne!(read("a.pfm"), read("c.pfm"));
 }
 
 #[test]
@@ -241,15 +244,21 @@ fn an_interrupt_writes_the_picture_so_far() {
     let folder = Folder::new("interrupt");
     let mut child = folder
         .command(&["render", "--resolution", "64x64", "--spp", "10000000", "-o", "x.exr"])
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .expect("starts");
-    std::thread::sleep(std::time::Duration::from_millis(1500));
-    let kill = |signal: &str| Command::new("kill").args([signal, &child.id().to_string()]).status();
-    assert!(kill("-INT").expect("kill runs").success());
+    // The first line comes before the first sample; then half a second for the handler and some samples.
+    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().expect("piped")));
+    lines.next().expect("a line").expect("text");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupted.expect("kill runs").success());
+    lines.for_each(drop);
     let status = child.wait().expect("ends");
     assert!(status.success(), "{status}");
-    assert!(Path::new(&folder.0.join("x.exr")).exists());
+    // The header says how many samples the pixels really have.
+    let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
+    assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
 }
 
 #[test]

@@ -116,17 +116,6 @@ impl TextureContext {
     /// Without a footprint, where there is no [`Interaction`] (yet).
     #[inline]
     pub fn without_footprint(p: Point3, n: Normal3, uv: Point2, face: u32) -> Self {
-        Self {
-            p,
-            n,
-            uv,
-            dpdx: Vec3::ZERO,
-            dpdy: Vec3::ZERO,
-            dudx: 0.0,
-            dudy: 0.0,
-            dvdx: 0.0,
-            dvdy: 0.0,
-            face,
-        }
+        Self { p, n, uv, dpdx: Vec3::ZERO, dpdy: Vec3::ZERO, dudx: 0.0, dudy: 0.0, dvdx: 0.0, dvdy: 0.0, face }
     }
 }

@@ -46,6 +46,10 @@ impl Assets for FileAssets {
         if metadata.is_dir() {
             return Err(AssetError::Unreadable("it is a folder".into()));
         }
+        // A device or a pipe has no end that could be known beforehand.
+        if !metadata.is_file() {
+            return Err(AssetError::Unreadable("it is not a regular file".into()));
+        }
         if metadata.len() > self.max_file_bytes {
             return Err(AssetError::TooLarge { bytes: metadata.len(), limit: self.max_file_bytes });
         }

@@ -60,6 +60,10 @@ impl Integrator for AmbientOcclusionIntegrator {
         });
     }
 
+    fn scatters(&self) -> bool {
+        false
+    }
+
     fn limits(&self) -> Vec<Limit> {
         vec![Limit::OtherQuantity("ambient occlusion")]
     }

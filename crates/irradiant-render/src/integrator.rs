@@ -58,6 +58,11 @@ pub trait Integrator: Send + Sync {
     /// (scene, settings, pixel, sample index), whatever the unit that it comes in.
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats);
 
+    /// True when the surfaces' scattering models are evaluated, whose own limits then belong to the picture.
+    fn scatters(&self) -> bool {
+        true
+    }
+
     /// What makes the expected picture differ from the solution of the rendering equation; empty when unbiased.
     fn limits(&self) -> Vec<Limit>;
 }

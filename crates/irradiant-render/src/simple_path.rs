@@ -5,6 +5,7 @@ use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::film::FilmTile;
+use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::light::SampleMode;
 use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::scene::Scene;
@@ -30,6 +31,7 @@ impl Integrator for SimplePathIntegrator {
             let mut radiance = SampledSpectrum::ZERO;
             let mut throughput = SampledSpectrum::ONE;
             let mut count_emission = true;
+            let mut previous: Option<ReferencePoint> = None;
             let mut depth = 0;
             loop {
                 let Some(hit) = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha()) else {
@@ -39,7 +41,12 @@ impl Integrator for SimplePathIntegrator {
                     break;
                 };
                 let at = scene.geometry.interaction(&ray, &hit);
-                if let (true, Some(light)) = (count_emission, at.light) {
+                // A light that samples cannot draw (a curve) counts whenever it is met.
+                let drawable = |light| match &previous {
+                    Some(p) => scene.lights.get(light).pdf_hit(p, ray.d, &(&at).into()) > 0.0,
+                    None => false,
+                };
+                if let Some(light) = at.light.filter(|&l| count_emission || !drawable(l)) {
                     radiance += throughput * scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
                 }
                 let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
@@ -109,6 +116,7 @@ impl Integrator for SimplePathIntegrator {
                     }
                     throughput *= 1.0 / survival;
                 }
+                previous = Some(at.reference());
                 ray = at.spawn_ray(wi);
                 stats.bounce_rays += 1;
             }

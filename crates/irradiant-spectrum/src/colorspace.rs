@@ -155,7 +155,7 @@ impl ColorSpace {
     /// A smooth reflectance spectrum that looks like linear `rgb` under this space's illuminant.
     ///
     /// Components are clamped to [0, 1] (NaN to 0). About 60 ns once the neighbourhood of the colour has
-    /// been seen, some 1.5 ms the first time (four columns of 64 fits). See [`crate::uplift`].
+    /// been seen, up to 1.5 ms the first time (four columns of up to 64 fits). See [`crate::uplift`].
     #[inline]
     pub fn uplift(&self, rgb: [f32; 3]) -> SigmoidPolynomial {
         self.columns.uplift(rgb)

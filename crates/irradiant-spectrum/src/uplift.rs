@@ -6,9 +6,10 @@
 //! interpolated trilinearly. Agreement with pbrt-v4 needs the same grid, start values and stopping rule, so those are
 //! kept; the Jacobian is analytic where pbrt's is by differences.
 //!
-//! Nothing is shipped and nothing is fitted in advance: a column of 64 fits (one largest component, one pair of
-//! ratios) is computed when a colour first needs it, and kept. It is a pure function of its place in the grid, so
-//! which thread gets there first does not matter.
+//! Nothing is shipped and nothing is fitted in advance: a part of a column (one largest component, one pair of ratios,
+//! a third of its 64 fits) is computed when a colour first needs it, and kept. It is a pure function of its place in the
+//! grid, so which thread gets there first does not matter. Whole columns took a second more under a sky of many colours,
+//! whose light is uplifted at half its size and only ever asks for the middle.
 
 use crate::data::{cie1931, illuminants};
 use crate::matrix::{self, Matrix};
@@ -60,9 +61,51 @@ impl SigmoidPolynomial {
 /// Grid points along each axis.
 const RESOLUTION: usize = 64;
 
-/// Coefficients for one largest component and one pair of ratios, along the largest component's value;
-/// padded so that three are read as one.
-type Column = [[f32; 4]; RESOLUTION];
+/// Where along a column the published procedure starts: upwards, and downwards.
+const START: usize = RESOLUTION / 5;
+
+/// Where the way upwards is interrupted: just above one half, the largest component of colours of any size.
+const MIDDLE: usize = RESOLUTION / 2;
+
+/// A stretch of a column, from START down, from START up to MIDDLE, or from there on up; the ends are in both.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stretch {
+    Low,
+    Middle,
+    High,
+}
+
+impl Stretch {
+    /// The one that has grid points `z` and `z + 1`.
+    #[inline]
+    fn of(z: usize) -> Self {
+        if z >= MIDDLE {
+            Self::High
+        } else if z >= START {
+            Self::Middle
+        } else {
+            Self::Low
+        }
+    }
+
+    /// Its first grid point.
+    #[inline]
+    fn first(self) -> usize {
+        match self {
+            Self::Low => 0,
+            Self::Middle => START,
+            Self::High => MIDDLE,
+        }
+    }
+}
+
+/// Coefficients for one largest component and one pair of ratios, along a stretch of the largest component's values.
+struct Part {
+    /// Padded so that three are read as one.
+    coefficients: [[f32; 4]; RESOLUTION - MIDDLE],
+    /// Where the last fit ended, for the stretch that goes on from it.
+    end: [f64; 3],
+}
 
 /// The colour spaces for which fits are defined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +120,8 @@ pub(crate) enum Gamut {
 pub(crate) struct Columns {
     gamut: Gamut,
     fit: OnceLock<Box<Fit>>,
-    columns: Box<[OnceLock<Box<Column>>]>,
+    /// By stretch, then by column.
+    parts: [Box<[OnceLock<Box<Part>>]>; 3],
     /// Value of the largest component at each grid point.
     scale: [f32; RESOLUTION],
     /// For each 256th of the unit interval, the last grid point below its start: where to begin to look.
@@ -95,7 +139,7 @@ impl Columns {
         Self {
             gamut,
             fit: OnceLock::new(),
-            columns: (0..3 * RESOLUTION * RESOLUTION).map(|_| OnceLock::new()).collect(),
+            parts: std::array::from_fn(|_| (0..3 * RESOLUTION * RESOLUTION).map(|_| OnceLock::new()).collect()),
             scale: std::array::from_fn(grid_value),
             below: std::array::from_fn(|i| {
                 let start = i as f32 / 256.0;
@@ -104,15 +148,20 @@ impl Columns {
         }
     }
 
-    /// The coefficients at grid point (`largest`, `y`, `x`), for all values of the largest component.
+    /// The coefficients at grid point (`largest`, `y`, `x`), for a stretch of values of the largest component.
     #[inline]
-    fn column(&self, largest: usize, y: usize, x: usize) -> &Column {
-        self.columns[(largest * RESOLUTION + y) * RESOLUTION + x].get_or_init(|| self.compute(largest, y, x))
+    fn part(&self, stretch: Stretch, largest: usize, y: usize, x: usize) -> &Part {
+        let column = (largest * RESOLUTION + y) * RESOLUTION + x;
+        self.parts[stretch as usize][column].get_or_init(|| self.compute(stretch, largest, y, x))
     }
 
     #[cold]
-    fn compute(&self, largest: usize, y: usize, x: usize) -> Box<Column> {
-        self.fit.get_or_init(|| Box::new(Fit::new(self.gamut))).column(largest, y, x)
+    fn compute(&self, stretch: Stretch, largest: usize, y: usize, x: usize) -> Box<Part> {
+        let before = match stretch {
+            Stretch::Low | Stretch::Middle => [0.0; 3],
+            Stretch::High => self.part(Stretch::Middle, largest, y, x).end,
+        };
+        self.fit.get_or_init(|| Box::new(Fit::new(self.gamut))).part(stretch, before, largest, y, x)
     }
 
     pub(crate) fn uplift(&self, rgb: [f32; 3]) -> SigmoidPolynomial {
@@ -142,13 +191,13 @@ impl Columns {
         let (x1, y1) = (x - xi as f32, y - yi as f32);
         let z1 = (z - self.scale[zi]) / (self.scale[zi + 1] - self.scale[zi]);
         let (x0, y0, z0) = (1.0 - x1, 1.0 - y1, 1.0 - z1);
-        let c00 = self.column(largest, yi, xi);
-        let c01 = self.column(largest, yi, xi + 1);
-        let c10 = self.column(largest, yi + 1, xi);
-        let c11 = self.column(largest, yi + 1, xi + 1);
+        let stretch = Stretch::of(zi);
+        let part = |y, x| &self.part(stretch, largest, y, x).coefficients;
+        let (c00, c01, c10, c11) = (part(yi, xi), part(yi, xi + 1), part(yi + 1, xi), part(yi + 1, xi + 1));
         let plane = |z: usize| -> [f32; 4] {
             std::array::from_fn(|j| (c00[z][j] * x0 + c01[z][j] * x1) * y0 + (c10[z][j] * x0 + c11[z][j] * x1) * y1)
         };
+        let zi = zi - stretch.first();
         let (near, far) = (plane(zi), plane(zi + 1));
         let coefficients = std::array::from_fn(|j| near[j] * z0 + far[j] * z1);
         SigmoidPolynomial { coefficients }
@@ -277,24 +326,25 @@ impl Fit {
         fit
     }
 
-    /// The 64 fits along one column, from a fifth of the way up and then down, each starting at its neighbour.
-    fn column(&self, largest: usize, y: usize, x: usize) -> Box<Column> {
+    /// The fits along a stretch of one column, each starting at its neighbour, the first at `before`.
+    fn part(&self, stretch: Stretch, before: [f64; 3], largest: usize, y: usize, x: usize) -> Box<Part> {
         let ratio = |i: usize| i as f64 / (RESOLUTION - 1) as f64;
-        let mut column = Box::new([[0.0f32; 4]; RESOLUTION]);
-        let start = RESOLUTION / 5;
+        let mut part = Box::new(Part { coefficients: [[0.0; 4]; RESOLUTION - MIDDLE], end: before });
         let mut solve = |range: &mut dyn Iterator<Item = usize>| {
-            let mut c = [0.0; 3];
             for k in range {
                 let z = f64::from(grid_value(k));
                 let mut rgb = [0.0; 3];
                 rgb[largest] = z;
                 rgb[(largest + 1) % 3] = ratio(x) * z;
                 rgb[(largest + 2) % 3] = ratio(y) * z;
-                self.gauss_newton(rgb, &mut c);
+                // The fit of MIDDLE is done when the way upwards goes on from there.
+                if stretch != Stretch::High || k > MIDDLE {
+                    self.gauss_newton(rgb, &mut part.end);
+                }
                 // From the unit interval to nm.
                 let (from, per) = (360.0, 1.0 / 470.0);
-                let [a, b, d] = c;
-                column[k] = [
+                let [a, b, d] = part.end;
+                part.coefficients[k - stretch.first()] = [
                     (a * per * per) as f32,
                     (b * per - 2.0 * a * from * per * per) as f32,
                     (d - b * from * per + a * (from * per) * (from * per)) as f32,
@@ -302,9 +352,12 @@ impl Fit {
                 ];
             }
         };
-        solve(&mut (start..RESOLUTION));
-        solve(&mut (0..=start).rev());
-        column
+        match stretch {
+            Stretch::Low => solve(&mut (0..=START).rev()),
+            Stretch::Middle => solve(&mut (START..=MIDDLE)),
+            Stretch::High => solve(&mut (MIDDLE..RESOLUTION)),
+        }
+        part
     }
 
     /// Move the coefficients `c` (over the unit interval) to where their colour is `rgb`, in at most 15 steps.

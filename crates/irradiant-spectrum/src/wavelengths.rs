@@ -59,19 +59,28 @@ impl Wavelengths {
     /// Each wavelength alone has density `pdf`; together they are stratified.
     #[inline]
     pub fn sample_visible(u: f32) -> Self {
-        let mut lambda = [0.0; N_WAVELENGTHS];
-        let mut pdf = [0.0; N_WAVELENGTHS];
-        for i in 0..N_WAVELENGTHS {
-            let mut rotated = u + i as f32 / N_WAVELENGTHS as f32;
-            if rotated > 1.0 {
-                rotated -= 1.0;
-            }
-            // Rounding may step a hair outside the range, where the pdf would be 0.
-            lambda[i] = sample_visible_wavelength(rotated).clamp(LAMBDA_MIN, LAMBDA_MAX);
-            // 1 / cosh(atanh y)^2 = 1 - y^2: visible_wavelength_pdf without its exponential.
-            let y = visible_height(rotated);
-            pdf[i] = 0.003_939_804_2 * (1.0 - y) * (1.0 + y);
-        }
+        let rotated: [f32; N_WAVELENGTHS] = std::array::from_fn(|i| {
+            let rotated = u + i as f32 / N_WAVELENGTHS as f32;
+            if rotated > 1.0 { rotated - 1.0 } else { rotated }
+        });
+        // As sample_visible_wavelength, lane by lane in each step, which LLVM makes packed instructions of (4 times
+        // faster): ln of (1 + y) / (1 - y) = 2^k m, with m in [sqrt(1/2), sqrt(2)), as k ln 2 + 2 atanh((m - 1) / (m + 1)).
+        const SQRT_HALF: u32 = 0x3f35_04f3;
+        let y = rotated.map(visible_height);
+        let ratio = y.map(|y| ((1.0 + y) / (1.0 - y)).to_bits().wrapping_sub(SQRT_HALF));
+        let k = ratio.map(|bits| ((bits as i32) >> 23) as f32);
+        let m = ratio.map(|bits| f32::from_bits((bits & 0x007f_ffff).wrapping_add(SQRT_HALF)));
+        let s = m.map(|m| (m - 1.0) / (m + 1.0));
+        // Series to s^9, |s| < 0.172: error 1e-9.
+        let half_ln: [f32; N_WAVELENGTHS] = std::array::from_fn(|i| {
+            let (s, z) = (s[i], s[i] * s[i]);
+            let tail = z * (0.333_333_33 + z * (0.2 + z * (0.142_857_14 + z * 0.111_111_11)));
+            k[i] * (0.5 * std::f32::consts::LN_2) + (s + s * tail)
+        });
+        // Rounding may step a hair outside the range, where the pdf would be 0.
+        let lambda = half_ln.map(|h| (538.0 - 138.888_89 * h).clamp(LAMBDA_MIN, LAMBDA_MAX));
+        // 1 / cosh(atanh y)^2 = 1 - y^2: visible_wavelength_pdf without its exponential.
+        let pdf = y.map(|y| 0.003_939_804_2 * (1.0 - y) * (1.0 + y));
         Self { lambda, pdf, basis: Basis::Spectral }
     }
 
@@ -138,6 +147,21 @@ mod tests {
     }
 
     // A quadrature with 20,000 nodes, not a random test: an error of 1e-4 in the density is seen.
+    #[test]
+    fn four_lanes_are_four_single_wavelengths() {
+        for i in 0..100_000 {
+            let u = i as f32 / 100_000.0;
+            let w = Wavelengths::sample_visible(u);
+            for k in 0..N_WAVELENGTHS {
+                let rotated = u + k as f32 / N_WAVELENGTHS as f32;
+                let single = sample_visible_wavelength(if rotated > 1.0 { rotated - 1.0 } else { rotated });
+                assert!((w.lambda[k] - single).abs() < 2e-4, "{u} {k}: {} {single}", w.lambda[k]);
+                let pdf = visible_wavelength_pdf(w.lambda[k]);
+                assert!((w.pdf[k] / pdf - 1.0).abs() < 2e-5, "{u} {k}: {} {pdf}", w.pdf[k]);
+            }
+        }
+    }
+
     #[test]
     fn every_way_of_drawing_integrates_alike() {
         let f = |l: f32| (-((f64::from(l) - 560.0) / 60.0).powi(2)).exp();

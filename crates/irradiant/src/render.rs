@@ -211,8 +211,8 @@ fn integrator_name(kind: &IntegratorKind) -> String {
 /// "unbiased", or why not: what is left out, what is biased, what else is estimated.
 fn estimate_label(integrator: &dyn Integrator, scene: &Scene) -> String {
     let mut limits = integrator.limits();
-    // Light passes a surface's models only where the integrator asks them for it.
-    if !limits.iter().any(|l| matches!(l, Limit::OtherQuantity(_))) {
+    // What the surfaces' models leave out matters where they are asked.
+    if integrator.scatters() {
         limits.extend(scene.truncations().iter().cloned().map(Limit::Truncation));
     }
     limits.extend(scene.biases().iter().cloned().map(Limit::Bias));

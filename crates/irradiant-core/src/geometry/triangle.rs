@@ -196,7 +196,10 @@ impl Mesh {
             dpdu = combine(d12[1], dp02, -d02[1], dp12) * inverse;
             dpdv = combine(d02[0], dp12, -d12[0], dp02) * inverse;
         }
-        if !has_uv || dpdu.cross(dpdv).length_squared() == 0.0 {
+        // Default coordinates span the triangle itself, whose normal is there already; below this, squares vanish.
+        let is_flat =
+            if self.uvs.is_empty() { !(length > 1e-18) } else { !has_uv || dpdu.cross(dpdv).length_squared() == 0.0 };
+        if is_flat {
             // pbrt spans the tangent plane around -n here; any frame will do.
             let frame = Frame::from_z(-n.as_vec());
             (dpdu, dpdv) = (frame.x, frame.y);

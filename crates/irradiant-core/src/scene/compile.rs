@@ -12,7 +12,9 @@ use crate::material::Materials;
 use crate::sampler::Sampler;
 use crate::texture::Textures;
 use irradiant_image::{Image, ReadOptions};
-use irradiant_scene::desc::{CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilmKind, FilterKind, SceneDesc};
+use irradiant_scene::desc::{
+    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilmKind, FilterKind, Randomization, SamplerKind, SceneDesc,
+};
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
 use std::sync::Arc;
@@ -83,7 +85,10 @@ fn compile(
     // Settings that the caller may override come first: the rest depends on them.
     let mut film = desc.film.clone();
     if let Some(resolution) = options.resolution {
-        film.resolution.value = resolution;
+        let stated = std::mem::replace(&mut film.resolution.value, resolution);
+        if let Some(bounds) = &mut film.pixel_bounds {
+            bounds.value = scaled_bounds(bounds.value, stated, resolution);
+        }
     }
     if options.crop.is_some() {
         (film.crop_window, film.pixel_bounds) = (options.crop.map(Spanned::unplaced), None);
@@ -132,6 +137,25 @@ fn compile(
     if film.max_component_value.is_finite() {
         biases.push(format!("maxcomponentvalue {}", film.max_component_value.value));
     }
+    if desc.options.disable_pixel_jitter {
+        biases.push("disablepixeljitter".into());
+    }
+    if desc.options.disable_wavelength_jitter && options.basis == Basis::Spectral {
+        biases.push("disablewavelengthjitter".into());
+    }
+    match desc.sampler.kind {
+        SamplerKind::Stratified { jitter: false, .. }
+        | SamplerKind::Halton(Randomization::None)
+        | SamplerKind::Sobol(Randomization::None)
+        | SamplerKind::PaddedSobol(Randomization::None) => biases.push("samples are not randomized".into()),
+        SamplerKind::Independent
+        | SamplerKind::Stratified { .. }
+        | SamplerKind::Halton(_)
+        | SamplerKind::Sobol(_)
+        | SamplerKind::PaddedSobol(_)
+        | SamplerKind::ZSobol
+        | SamplerKind::Pmj02bn => {}
+    }
 
     Some(Scene {
         geometry,
@@ -161,6 +185,14 @@ fn compile(
         truncations,
         biases,
         facts,
+    })
+}
+
+/// The same part (x0, x1, y0, y1) of an image of another size; what it touches counts whole.
+fn scaled_bounds(bounds: [i32; 4], from: [u32; 2], to: [u32; 2]) -> [i32; 4] {
+    std::array::from_fn(|i| {
+        let scaled = bounds[i] as f64 * to[i / 2] as f64 / from[i / 2].max(1) as f64;
+        (if i % 2 == 0 { scaled.floor() } else { scaled.ceil() }) as i32
     })
 }
 

@@ -104,15 +104,16 @@ impl Session {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             n => n,
         };
-        let workers = (0..threads)
-            .map(|i| {
+        let workers: Vec<_> = (0..threads)
+            .filter_map(|i| {
                 let shared = Arc::clone(&shared);
-                std::thread::Builder::new()
-                    .name(format!("render {i}"))
-                    .spawn(move || worker::work(&shared))
-                    .unwrap_or_else(|why| panic!("the system refuses a thread: {why}"))
+                // Where the system refuses a thread those that started do the work.
+                std::thread::Builder::new().name(format!("render {i}")).spawn(move || worker::work(&shared)).ok()
             })
             .collect();
+        if workers.is_empty() {
+            worker::work(&shared);
+        }
         Self { shared, workers }
     }
 
