@@ -45,10 +45,13 @@ impl Reporter {
     }
 
     /// Shows where it is.
-    pub fn update(&mut self, progress: &Progress, noise: f64) {
+    ///
+    /// The noise is `None` while most pixels have fewer than two samples: nothing can be said then.
+    pub fn update(&mut self, progress: &Progress, noise: Option<f64>) {
         let text = || {
             let left = progress.time_left().map_or("?".into(), short_time);
-            format!("{}/s  noise {:.2} %  {left} left", short_count(progress.rate()), 100.0 * noise)
+            let noise = noise.map_or("-".into(), |n| format!("{:.2} %", 100.0 * n));
+            format!("{}/s  noise {noise}  {left} left", short_count(progress.rate()))
         };
         match self {
             Self::Quiet => {}

@@ -77,11 +77,12 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     if !arguments.quiet {
         let bounds = job.scene.bounds();
         say!(
-            "{}: {} x {} pixels, {} samples each, {}",
+            "{}: {} x {} pixels, {} sample{} each, {}",
             file.name,
             bounds.width(),
             bounds.height(),
             job.header.samples_per_pixel,
+            if job.header.samples_per_pixel == 1 { "" } else { "s" },
             job.header.estimate
         );
     }
@@ -113,6 +114,9 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
             .map_err(|why| Error::Output { path: path.clone(), why })?;
     }
     report_refused(&rendering, arguments);
+    if let (false, Some([least, most])) = (arguments.quiet, rendering.header.samples_taken) {
+        say!("stopped early: {least} to {most} of {} samples per pixel", rendering.header.samples_per_pixel);
+    }
     if !arguments.quiet {
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         let (seconds, cpu) = clock.total();
@@ -156,15 +160,18 @@ fn watch(job: &Job, quiet: bool) -> Watched {
     });
     let session = job.start();
     let mut reporter = Reporter::new(quiet);
-    let (mut noise, mut noise_at) = (0.0, Instant::now());
+    let (mut noise, mut noise_at) = (None, Instant::now());
     let mut interrupted = false;
     loop {
         let progress = session.progress();
         if progress.finished {
             break;
         }
-        if reporter.wants_noise() && (noise == 0.0 || noise_at.elapsed() > Duration::from_secs(2)) {
-            (noise, noise_at) = (session.totals().relative_error, Instant::now());
+        if reporter.wants_noise() && (noise.is_none() || noise_at.elapsed() > Duration::from_secs(2)) {
+            let totals = session.totals();
+            // With one sample a pixel has no variance to speak of.
+            noise = (totals.min_count >= 2).then_some(totals.relative_error);
+            noise_at = Instant::now();
         }
         reporter.update(&progress, noise);
         if !interrupted && interrupts.load(Ordering::Relaxed) > 0 {
@@ -191,6 +198,9 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
         arguments.output.clone()
     };
     // Tell now, not after hours of rendering.
+    for path in paths.iter().chain(&arguments.stats) {
+        check_folder(path)?;
+    }
     for path in &paths {
         let known = FileFormat::from_name(&path.to_string_lossy());
         if known.is_none_or(|f| matches!(f, FileFormat::Tga | FileFormat::Bmp)) {
@@ -199,19 +209,31 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
                 path.display()
             )));
         }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if path.is_dir() {
-            return Err(Error::Settings(format!("--output {}: is a folder", path.display())));
-        }
-        if !folder.is_dir() {
-            return Err(Error::Settings(format!(
-                "--output {}: there is no folder {}",
-                path.display(),
-                folder.display()
-            )));
-        }
     }
     Ok(paths)
+}
+
+/// That a file can be made where `path` wants to be.
+fn check_folder(path: &Path) -> Result<(), Error> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let refuse = |what: String| Err(Error::Settings(format!("{}: {what}", path.display())));
+    if path.is_dir() {
+        return refuse("is a folder, not a file to write".into());
+    }
+    if !folder.is_dir() {
+        return refuse(format!("there is no folder {}", folder.display()));
+    }
+    let trial = folder.join(format!(".irradiant-trial-{}", std::process::id()));
+    match std::fs::OpenOptions::new().write(true).create_new(true).open(&trial) {
+        Ok(_) => {
+            let _ = std::fs::remove_file(&trial);
+            Ok(())
+        }
+        Err(error) => {
+            let why = irradiant::image::ImageError::Io { path: folder.to_owned(), error };
+            Err(Error::Output { path: path.to_owned(), why })
+        }
+    }
 }
 
 /// Refused samples are never hidden: how many, and where the first ones are.

@@ -45,7 +45,8 @@ fn plural(n: usize, word: &str) -> String {
 }
 
 /// Why there is no picture.
-#[derive(Debug)]
+///
+/// `Debug` is `Display`: a `main` that returns this prints what a person can read.
 pub enum Error {
     /// The scene is wrong: its author can fix it. The report says where.
     Scene(Box<Report>),
@@ -78,6 +79,12 @@ impl std::fmt::Display for Error {
             Self::Output { path, why } => write!(f, "cannot write {}: {why}", path.display()),
             Self::Internal(what) => write!(f, "a bug in Irradiant: {what}"),
         }
+    }
+}
+
+impl std::fmt::Debug for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{self}")
     }
 }
 

@@ -95,8 +95,18 @@ impl Sides {
 }
 
 /// A set of properties of scattering: where to (reflection, transmission) and how (diffuse, glossy, specular).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct Lobe(pub u8);
+
+impl std::fmt::Debug for Lobe {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let words = ["reflection", "transmission", "diffuse", "glossy", "specular"];
+        // How, then where to: "specular transmission".
+        let named: Vec<&str> = (0..5).rev().filter(|bit| self.0 >> bit & 1 == 1).map(|bit| words[bit]).collect();
+        f.write_str(if named.is_empty() { "nothing" } else { "" })?;
+        f.write_str(&named.join(" "))
+    }
+}
 
 impl Lobe {
     /// Nothing scatters.
