@@ -193,8 +193,10 @@ impl SphericalRectangle {
         let corners = [c0 + s0, c1 + s0, c0 + s1, c1 + s1].map(f64::sqrt);
         let start = edge_turn(x0, y0, y1, h, corners[0], corners[2]);
         let solid_angle = edge_turn(x1, y0, y1, h, corners[1], corners[3]).minus(start).angle();
+        // A point of the plane itself, but for rounding, must not see a half-space of rectangle: a lamp would light itself.
+        let rounding = 1e-6 * (p.abs().max_component() + s.abs().max_component()) + 1e-5 * lengths[0].max(lengths[1]);
         // Far away or almost in its plane, rounding leaves nothing (or a full turn); NaN compares false too.
-        let sound = h > 0.0 && solid_angle > 0.0 && solid_angle < std::f64::consts::TAU;
+        let sound = h > rounding as f64 && solid_angle > 0.0 && solid_angle < std::f64::consts::TAU;
         let z = if height < 0.0 { -z } else { z };
         sound.then_some(Self { origin: p, x, y, z, x0, x1, y0, y1, h, corners, start, solid_angle })
     }
@@ -437,5 +439,16 @@ mod tests {
         }
         // 4.5 sigma: one false alarm in 150,000; a 5 % error would show.
         assert!(irradiant_testkit::z_score(&ours, &theirs).abs() < 4.5, "{ours:?} {theirs:?}");
+    }
+
+    #[test]
+    fn a_point_of_its_own_plane_sees_no_rectangle() {
+        // A tilted lamp far from the origin, seen from points of itself that are rounded to f32.
+        let (s, ex, ey) = (Point3::new(40.3, 7.7, -90.1), Vec3::new(1.2, 0.0, 0.0), Vec3::new(0.0, -0.1, 1.1));
+        for i in 0..1000 {
+            let (a, b) = ((i % 31) as f32 / 30.0, (i / 31) as f32 / 33.0);
+            assert!(SphericalRectangle::new(s + (ex * a + ey * b), s, ex, ey).is_none(), "{a} {b}");
+        }
+        assert!(SphericalRectangle::new(s + (ex + ey) * 0.5 + Vec3::new(0.0, 0.01, 0.0), s, ex, ey).is_some());
     }
 }
