@@ -207,6 +207,12 @@ impl SphericalRectangle {
         self.solid_angle as f32
     }
 
+    /// Distance of the rectangle's plane, > 0.
+    #[inline]
+    pub fn height(&self) -> f32 {
+        self.h as f32
+    }
+
     /// Distances of the corners `s`, `s + ex`, `s + ey`, `s + ex + ey`.
     #[inline]
     pub fn corner_distances(&self) -> [f32; 4] {

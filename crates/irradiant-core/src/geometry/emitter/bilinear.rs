@@ -1,11 +1,11 @@
 //! Bilinear patches: rectangles by solid angle, warped by the cosine at the receiver; others by area.
 
-use super::{Drawn, Nearness, NormalCone, ShapeSample, cosine_weights};
+use super::{Drawn, Nearness, NormalCone, ShapeSample, cosine_weights, is_on_plane};
 use crate::geometry::bilinear::{self, Corners};
 use crate::geometry::placement::{cross, dot, double, length, scale, single, sub};
 use crate::interaction::ReferencePoint;
 use irradiant_math::warp::{SphericalRectangle, bilinear, bilinear_pdf};
-use irradiant_math::{Bounds3, Normal3, Point2, Point3, Vec3};
+use irradiant_math::{Bounds3, Normal3, Point2, Point3, Vec3, gamma};
 
 /// Smaller rectangles are sampled by area, as in pbrt.
 const LEAST_SOLID_ANGLE: f32 = 1e-4;
@@ -23,6 +23,8 @@ pub struct BilinearEmitter {
     weights: [f32; 4],
     area: f32,
     near: Nearness,
+    /// Holds for every point of a rectangle.
+    p_error: Vec3,
 }
 
 impl BilinearEmitter {
@@ -46,6 +48,7 @@ impl BilinearEmitter {
             weights,
             area: (sum / (N * N) as f64) as f32,
             near: Nearness::new(p.map(|c| Point3::from(single(c)))),
+            p_error: [0, 1, 2].map(|k| p.iter().fold(0.0f64, |m, c| m.max(c[k].abs())) as f32 * gamma(7)).into(),
         }
     }
 
@@ -144,6 +147,9 @@ impl BilinearEmitter {
 
     pub(super) fn sample(&self, at: &ReferencePoint, u: Point2) -> Drawn {
         let Some(seen) = self.seen_from(at.p) else { return Drawn::ByArea };
+        if is_on_plane(at, seen.height(), self.p_error) {
+            return Drawn::Nothing;
+        }
         let (u, mut pdf) = match self.cosines(at) {
             Some(w) => {
                 let u = bilinear(u, w);
@@ -162,6 +168,9 @@ impl BilinearEmitter {
 
     pub(super) fn pdf(&self, at: &ReferencePoint, p: Point3) -> Option<f32> {
         let seen = self.seen_from(at.p)?;
+        if is_on_plane(at, seen.height(), self.p_error) {
+            return Some(0.0);
+        }
         let warp = self.cosines(at).map_or(1.0, |w| bilinear_pdf(seen.inverse(p), w));
         Some(warp / seen.solid_angle())
     }

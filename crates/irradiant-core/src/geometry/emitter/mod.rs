@@ -149,6 +149,7 @@ impl EmitterShape {
         };
         let s = match drawn {
             Drawn::BySolidAngle(s) => s,
+            Drawn::Nothing => return None,
             Drawn::ByArea => {
                 let mut s = self.sample_area(u, wants_uv)?;
                 let to = s.p - at.p;
@@ -197,6 +198,15 @@ impl EmitterShape {
 enum Drawn {
     BySolidAngle(ShapeSample),
     ByArea,
+    Nothing,
+}
+
+/// True when a point at `height` over a plane may just as well be on it, both being known with an error: as is every
+/// point of a flat shape itself, which would otherwise light itself from within that error, at any angle.
+#[inline]
+fn is_on_plane(at: &ReferencePoint, height: f32, error: Vec3) -> bool {
+    let e = at.p_error + error;
+    height <= e.x + e.y + e.z
 }
 
 /// distance^2 / |cos|; `None` edge-on or at distance zero.

@@ -3,7 +3,7 @@
 //! Two triangles of a mesh that together are a rectangle are one emitter: half as many lights to choose from, and no
 //! seam for strata to break at.
 
-use super::{Drawn, Nearness, NormalCone, ShapeSample, TriangleEmitter, cosine_weights_of};
+use super::{Drawn, Nearness, NormalCone, ShapeSample, TriangleEmitter, cosine_weights_of, is_on_plane};
 use crate::geometry::placement::{Double3, add, cross, dot, double, length, scale, single, sub};
 use crate::geometry::triangle::interpolate2;
 use crate::interaction::ReferencePoint;
@@ -144,6 +144,9 @@ impl RectangleEmitter {
     #[inline]
     pub(super) fn sample(&self, at: &ReferencePoint, u: Point2, wants_uv: bool) -> Drawn {
         let Some(seen) = self.seen_from(at.p) else { return Drawn::ByArea };
+        if is_on_plane(at, seen.height(), self.p_error) {
+            return Drawn::Nothing;
+        }
         let (u, mut pdf) = match self.weights(at, &seen) {
             Some(w) => {
                 let u = bilinear(u, w);
@@ -159,6 +162,9 @@ impl RectangleEmitter {
 
     pub(super) fn pdf(&self, at: &ReferencePoint, p: Point3) -> Option<f32> {
         let seen = self.seen_from(at.p)?;
+        if is_on_plane(at, seen.height(), self.p_error) {
+            return Some(0.0);
+        }
         let warp = self.weights(at, &seen).map_or(1.0, |w| bilinear_pdf(seen.inverse(p), w));
         Some(warp / seen.solid_angle())
     }
