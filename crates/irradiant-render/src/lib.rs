@@ -4,6 +4,8 @@
 //! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`record`] (what a path tells of
 //! itself), then [`schedule`] and [`session`]: which work, and who does it.
 #![forbid(unsafe_code)]
+// `!(x > 0.0)` is how this house says "not positive, or NaN".
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 pub mod ambient_occlusion;
 pub mod camera_samples;
