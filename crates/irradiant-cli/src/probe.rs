@@ -3,6 +3,7 @@
 use crate::exit::Exit;
 use crate::options::PictureOptions;
 use clap::Args;
+use irradiant::core::bsdf::Bsdf;
 use irradiant::core::interaction::Interaction;
 use irradiant::math::Vec3;
 use irradiant::renderer::RenderStats;
@@ -114,7 +115,7 @@ impl PathRecorder for Printer<'_> {
         println!("wavelengths  {:.2} {:.2} {:.2} {:.2} nm", l[0], l[1], l[2], l[3]);
     }
 
-    fn vertex(&mut self, depth: u32, at: &Interaction) {
+    fn vertex(&mut self, depth: u32, at: &Interaction, _bsdf: &Bsdf) {
         let p = self.scene.world_from_render().point(at.p);
         println!("vertex {depth}     at ({:.6}, {:.6}, {:.6}) world, distance {:.6}", p.x, p.y, p.z, at.t);
         println!("             normal {}  shading {}", vector(at.n.as_vec()), vector(at.ns.as_vec()));

@@ -96,7 +96,7 @@ impl PathIntegrator {
                 stats.bounce_rays += 1;
                 continue;
             };
-            recorder.vertex(depth, &at);
+            recorder.vertex(depth, &at, &bsdf);
             if depth == 0 && !layers.is_empty() {
                 scene.layers.fill(layers, scene, camera_ray, &at, &footprint, &bsdf, lambda);
             }
@@ -190,6 +190,7 @@ impl PathIntegrator {
                 bounces: depth,
                 technique: Technique::Hit,
                 light,
+                wi: ray.d,
                 radiance,
                 mis_weight: weight,
                 light_pdf,
@@ -227,6 +228,7 @@ impl PathIntegrator {
             bounces: depth,
             technique: Technique::Hit,
             light,
+            wi: ray.d,
             radiance,
             mis_weight: weight,
             light_pdf,
@@ -274,6 +276,7 @@ fn direct_light<R: PathRecorder>(
         bounces: depth + 1,
         technique: Technique::LightSample,
         light,
+        wi: sample.wi,
         radiance,
         mis_weight: weight,
         light_pdf,

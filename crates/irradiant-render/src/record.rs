@@ -3,6 +3,7 @@
 //!
 //! An integrator is generic over a [`PathRecorder`]; with [`NoRecord`] the telling costs nothing.
 
+use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::Lobe;
 use irradiant_core::interaction::{Interaction, LightId};
 use irradiant_math::Vec3;
@@ -26,6 +27,8 @@ pub struct Contribution {
     pub technique: Technique,
     /// The light.
     pub light: LightId,
+    /// From the last vertex (or the eye) towards the light, unit.
+    pub wi: Vec3,
     /// Radiance carried to the eye, all weights included.
     pub radiance: SampledSpectrum,
     /// Multiple-importance weight that is included.
@@ -59,8 +62,8 @@ pub trait PathRecorder {
     const ENABLED: bool = true;
     /// The path begins.
     fn begin(&mut self, _lambda: &Wavelengths) {}
-    /// The path meets a surface; `depth` scattering events came before.
-    fn vertex(&mut self, _depth: u32, _at: &Interaction) {}
+    /// The path meets a surface that scatters like this; `depth` scattering events came before.
+    fn vertex(&mut self, _depth: u32, _at: &Interaction, _bsdf: &Bsdf) {}
     /// The path leaves the scene.
     fn escape(&mut self, _depth: u32, _direction: Vec3) {}
     /// Light is found.
