@@ -16,7 +16,7 @@
 //! - `node`: the tree in memory; `validate`: its invariants.
 //! - `triangle`: the watertight test, scalar and four at a time.
 //! - `traverse`: the walk, once for closest hits and once for any hit.
-//! - `lanes`: four floats.
+//! - `lanes`: four floats; `prefetch`: asking for memory early.
 //!
 //! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);
 //! Wald 2007 (binned SAH); Woop, Benthin, Wald 2013 (watertight triangles); Ize 2013 (conservative boxes);
@@ -27,6 +27,7 @@ mod build;
 mod lanes;
 mod level;
 mod node;
+mod prefetch;
 mod ray;
 mod traverse;
 mod triangle;
@@ -35,4 +36,5 @@ mod validate;
 pub use build::{BuildInput, BuildReport, BuildSettings, Mesh};
 pub use level::Level;
 pub use node::Bvh;
+pub use prefetch::prefetch_read;
 pub use ray::{Closest, Hit, Leaves, Ray, TrianglesOnly};

@@ -5,10 +5,13 @@
 //! scaled up by `PADDING`, which covers the rounding of the slab test (Ize 2013) and that of the shear in the
 //! triangle test.
 
+mod batch;
 mod boxes;
 mod scalar;
 mod walk;
 
+#[cfg(test)]
+mod batch_tests;
 #[cfg(test)]
 mod tests;
 

@@ -12,47 +12,47 @@ use crate::triangle::{self, Shear};
 use crate::{BuildInput, BuildSettings, Mesh};
 
 /// A small generator (SplitMix64), so that tests need nothing else.
-struct Random(u64);
+pub(super) struct Random(pub u64);
 
 impl Random {
-    fn bits(&mut self) -> u64 {
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         x ^ (x >> 31)
     }
     /// Uniform in [0, 1).
-    fn unit(&mut self) -> f32 {
+    pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1 << 24) as f32
     }
     /// Uniform in [-1, 1).
-    fn signed(&mut self) -> f32 {
+    pub fn signed(&mut self) -> f32 {
         2.0 * self.unit() - 1.0
     }
-    fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
-    fn point(&mut self) -> [f32; 3] {
+    pub fn point(&mut self) -> [f32; 3] {
         [self.signed(), self.signed(), self.signed()]
     }
 }
 
 #[derive(Clone, Default)]
-struct Soup {
-    positions: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
+pub(super) struct Soup {
+    pub positions: Vec<[f32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
 }
 
 impl Soup {
-    fn push(&mut self, corners: [[f32; 3]; 3]) {
+    pub fn push(&mut self, corners: [[f32; 3]; 3]) {
         let first = self.positions.len() as u32;
         self.positions.extend(corners);
         self.triangles.push([first, first + 1, first + 2]);
     }
-    fn mesh(&self) -> Mesh<'_> {
+    pub fn mesh(&self) -> Mesh<'_> {
         Mesh { positions: &self.positions, triangles: &self.triangles, filtered: false }
     }
-    fn build(&self) -> Bvh {
+    pub fn build(&self) -> Bvh {
         let bvh = Bvh::build(&BuildInput { meshes: &[self.mesh()], user_boxes: &[] }, &BuildSettings::default());
         assert_eq!(bvh.validate(), Ok(()));
         bvh
@@ -94,7 +94,7 @@ fn triangle_hit<U>(closest: Option<Closest<U>>) -> Option<Hit> {
 }
 
 /// Rays that start near the soup and go anywhere, along axes, at vertices, at edges, along edges.
-fn ray_at(soup: &Soup, scale: f32, random: &mut Random) -> Ray {
+pub(super) fn ray_at(soup: &Soup, scale: f32, random: &mut Random) -> Ray {
     let corner = |random: &mut Random| soup.positions[random.below(soup.positions.len())];
     let edge_point = |random: &mut Random| {
         let t = soup.triangles[random.below(soup.triangles.len())];
@@ -167,7 +167,7 @@ fn agree(name: &str, soup: &Soup, scale: f32, n_rays: usize) {
     assert!(hits > n_rays / 50, "{name}: only {hits} hits");
 }
 
-fn random_soup(n: usize, size: f32, scale: f32, seed: u64) -> Soup {
+pub(super) fn random_soup(n: usize, size: f32, scale: f32, seed: u64) -> Soup {
     let mut random = Random(seed);
     let mut soup = Soup::default();
     for _ in 0..n {
@@ -181,7 +181,7 @@ fn random_soup(n: usize, size: f32, scale: f32, seed: u64) -> Soup {
 }
 
 /// Triangles between points of a coarse lattice: shared vertices, coplanar and coincident triangles, axis-aligned ones.
-fn lattice_soup(n: usize, seed: u64) -> Soup {
+pub(super) fn lattice_soup(n: usize, seed: u64) -> Soup {
     let mut random = Random(seed);
     let mut soup = Soup::default();
     for _ in 0..n {
@@ -294,7 +294,7 @@ fn empty_and_improper_queries_meet_nothing() {
 }
 
 /// A closed ball of triangles with irregular vertices, all shared.
-fn ball(n: usize, seed: u64) -> Soup {
+pub(super) fn ball(n: usize, seed: u64) -> Soup {
     let mut random = Random(seed);
     let mut soup = Soup::default();
     let (rows, columns) = (n, 2 * n);
@@ -349,10 +349,10 @@ fn closed_meshes_do_not_leak() {
 }
 
 /// Balls, and a filter that lets through every third triangle near its first corner only.
-struct Balls(Vec<([f32; 3], f32)>);
+pub(super) struct Balls(pub Vec<([f32; 3], f32)>);
 
 impl Balls {
-    fn boxes(&self) -> Vec<[[f32; 3]; 2]> {
+    pub fn boxes(&self) -> Vec<[[f32; 3]; 2]> {
         self.0.iter().map(|(c, r)| [c.map(|x| x - r * 1.0001), c.map(|x| x + r * 1.0001)]).collect()
     }
 }

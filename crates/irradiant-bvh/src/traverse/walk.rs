@@ -22,6 +22,7 @@ use super::boxes::BoxTest;
 use super::scalar::counts;
 use super::{Best, PADDING, is_proper};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, STACK};
+use crate::prefetch;
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidate, Shear};
 
@@ -193,25 +194,13 @@ fn next(stack: &Stack<u64>, n: &mut usize, far: f32) -> Option<Child> {
 
 /// Asks for the first two cache lines of what `child` refers to.
 #[inline(always)]
-#[allow(unsafe_code)]
 fn prefetch(bvh: &Bvh, child: Child) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let (start, size) = if child.is_leaf() {
-            (bvh.blocks.as_ptr().cast::<i8>(), size_of::<Block>())
-        } else {
-            (bvh.nodes.as_ptr().cast::<i8>(), size_of::<Node>())
-        };
-        let line = start.wrapping_add(child.index() * size);
-        // SAFETY: a prefetch reads nothing that the program can see and faults at no address; SSE is baseline.
-        unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(line);
-            _mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (bvh, child);
+    let (start, size) = if child.is_leaf() {
+        (bvh.blocks.as_ptr().cast::<u8>(), size_of::<Block>())
+    } else {
+        (bvh.nodes.as_ptr().cast::<u8>(), size_of::<Node>())
+    };
+    prefetch::lines::<2>(start.wrapping_add(child.index() * size));
 }
 
 #[inline(always)]

@@ -75,6 +75,28 @@ pub struct Hit {
     pub(crate) instances: [u32; 2],
 }
 
+fn hit_of(closest: bvh::Closest<Hit>) -> Hit {
+    match closest {
+        bvh::Closest::Triangle(bvh::Hit { t, u, v, primitive }) => {
+            Hit { t, u, v, primitive, is_user: false, instances: [NO_INSTANCE; 2] }
+        }
+        bvh::Closest::User { hit, .. } => hit,
+    }
+}
+
+/// Rays that go to a tree in one call: few enough to stay in the nearest cache with their answers.
+const BATCH: usize = 64;
+
+/// As the tree wants them; at most [`BATCH`].
+fn gathered(rays: &[Ray], t_max: &[f32]) -> [bvh::Ray; BATCH] {
+    let nothing = bvh::Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 };
+    let mut out = [nothing; BATCH];
+    for ((out, ray), &t_max) in out.iter_mut().zip(rays).zip(t_max) {
+        *out = to_tree(ray, t_max);
+    }
+    out
+}
+
 /// A surface element that emits.
 #[derive(Clone, Debug)]
 pub struct Emitter {
@@ -124,18 +146,52 @@ impl Geometry {
         self.occluded(segment, 1.0, alpha)
     }
 
+    /// For each ray what [`intersect`](Self::intersect) gives, to the bit: `hits[i]` answers `rays[i]` up to `t_max[i]`.
+    ///
+    /// Any number of rays in any order, without allocation; fastest where neighbours in the slice travel together
+    /// (pixels of a small tile).
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn intersect_batch(&self, rays: &[Ray], t_max: &[f32], alpha: &impl AlphaTextures, hits: &mut [Option<Hit>]) {
+        assert_eq!((rays.len(), rays.len()), (t_max.len(), hits.len()), "one end and one answer for each ray");
+        let group = &self.groups[0];
+        let leaves = GroupLeaves { geometry: self, group, alpha };
+        let mut closest = [None; BATCH];
+        for ((rays, t_max), hits) in rays.chunks(BATCH).zip(t_max.chunks(BATCH)).zip(hits.chunks_mut(BATCH)) {
+            let rays = &gathered(rays, t_max)[..rays.len()];
+            let closest = &mut closest[..rays.len()];
+            group.tree.intersect_batch(self.level, rays, &leaves, closest);
+            for (hit, closest) in hits.iter_mut().zip(closest) {
+                *hit = closest.map(hit_of);
+            }
+        }
+    }
+
+    /// For each ray what [`occluded`](Self::occluded) says: `out[i]` answers `rays[i]` up to `t_max[i]`.
+    ///
+    /// Any number of rays in any order, without allocation; fastest where neighbours in the slice travel together
+    /// (from neighbouring points towards one light).
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn occluded_batch(&self, rays: &[Ray], t_max: &[f32], alpha: &impl AlphaTextures, out: &mut [bool]) {
+        assert_eq!((rays.len(), rays.len()), (t_max.len(), out.len()), "one end and one answer for each ray");
+        let group = &self.groups[0];
+        let leaves = GroupLeaves { geometry: self, group, alpha };
+        for ((rays, t_max), out) in rays.chunks(BATCH).zip(t_max.chunks(BATCH)).zip(out.chunks_mut(BATCH)) {
+            let rays = &gathered(rays, t_max)[..rays.len()];
+            group.tree.occluded_batch(self.level, rays, &leaves, out);
+        }
+    }
+
     pub(crate) fn closest<A: AlphaTextures>(
         &self,
         group: &Group,
         ray: &bvh::Ray,
         leaves: &GroupLeaves<A>,
     ) -> Option<Hit> {
-        Some(match group.tree.intersect(self.level, ray, leaves)? {
-            bvh::Closest::Triangle(bvh::Hit { t, u, v, primitive, .. }) => {
-                Hit { t, u, v, primitive, is_user: false, instances: [NO_INSTANCE; 2] }
-            }
-            bvh::Closest::User { hit, .. } => hit,
-        })
+        group.tree.intersect(self.level, ray, leaves).map(hit_of)
     }
 
     /// What the ray met at `hit` (which [`Geometry::intersect`] gave for this very ray).

@@ -1,5 +1,6 @@
 //! What all tests of geometry share: scenes in a few words.
 
+mod batch;
 mod emitters;
 mod hits;
 mod robust;
