@@ -5,6 +5,7 @@ mod check;
 mod compare;
 mod exit;
 mod image;
+mod integrators;
 mod options;
 mod probe;
 mod progress;
@@ -34,6 +35,7 @@ enum Command {
     Compare(compare::CompareArguments),
     Probe(probe::ProbeArguments),
     Image(image::ImageArguments),
+    Integrators(integrators::IntegratorsArguments),
 }
 
 fn main() -> ExitCode {
@@ -54,11 +56,14 @@ fn main() -> ExitCode {
     }));
     let arguments = Arguments::parse();
     let run = || match arguments.command {
+        Command::Render(a) if a.picture.asks_for_integrators() => integrators::list(),
+        Command::Probe(a) if a.picture.asks_for_integrators() => integrators::list(),
         Command::Render(a) => render::run(&a),
         Command::Check(a) => check::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Probe(a) => probe::run(&a),
         Command::Image(a) => image::run(&a),
+        Command::Integrators(a) => integrators::run(&a),
     };
     let exit = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or(Exit::Bug);
     ExitCode::from(exit as u8)

@@ -1,8 +1,7 @@
 //! Flags that several subcommands share, and how their values are read.
 
 use clap::Args;
-use irradiant::scene::desc::IntegratorKind;
-use irradiant::{ColorMode, MaxDepth, RenderSettings};
+use irradiant::{ColorMode, IntegratorChoice, MaxDepth, RenderSettings};
 use std::time::Duration;
 
 /// What determines the picture beside the scene.
@@ -20,9 +19,12 @@ pub struct PictureOptions {
     /// The part to render, as fractions of width and height
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
     pub crop: Option<Crop>,
-    /// path, simplepath, randomwalk or ambientocclusion [default: the scene's]
+    /// Integrator by name, "help" for a list [default: the scene's]
     #[arg(long, value_name = "NAME", value_parser = parse_integrator)]
-    pub integrator: Option<IntegratorKind>,
+    pub integrator: Option<IntegratorArgument>,
+    /// An option of the integrator; may be given several times; `irradiant integrators` lists them
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub estimator: Vec<String>,
     /// Scattering events at most, or "none" for an unbiased picture [default: the scene's, else pbrt's 5]
     #[arg(long, value_name = "N|none", value_parser = parse_max_depth)]
     pub max_depth: Option<MaxDepth>,
@@ -48,6 +50,11 @@ pub enum Color {
 pub struct Crop(pub [f32; 4]);
 
 impl PictureOptions {
+    /// True when the list of integrators was asked for instead of a picture.
+    pub fn asks_for_integrators(&self) -> bool {
+        matches!(self.integrator, Some(IntegratorArgument::Help))
+    }
+
     /// As the library wants them.
     pub fn settings(&self) -> RenderSettings {
         RenderSettings {
@@ -55,7 +62,11 @@ impl PictureOptions {
             seed: self.seed,
             resolution: self.resolution,
             crop: self.crop.map(|c| c.0),
-            integrator: self.integrator,
+            integrator: match &self.integrator {
+                Some(IntegratorArgument::Choice(choice)) => Some(choice.clone()),
+                Some(IntegratorArgument::Help) | None => None,
+            },
+            estimator: self.estimator.clone(),
             max_depth: self.max_depth,
             color: match self.color {
                 Color::Spectral => ColorMode::Spectral,
@@ -92,19 +103,19 @@ fn parse_crop(text: &str) -> Result<Crop, String> {
     Ok(Crop([x0, x1, y0, y1]))
 }
 
-fn parse_integrator(text: &str) -> Result<IntegratorKind, String> {
-    let known = ["path", "simplepath", "randomwalk", "ambientocclusion"];
+/// `--integrator`
+#[derive(Clone, Debug)]
+pub enum IntegratorArgument {
+    /// One of the registry.
+    Choice(IntegratorChoice),
+    /// The list of all is wanted.
+    Help,
+}
+
+fn parse_integrator(text: &str) -> Result<IntegratorArgument, String> {
     match text {
-        "path" => Ok(IntegratorKind::Path),
-        "simplepath" => Ok(IntegratorKind::SimplePath { sample_lights: true, sample_bsdf: true }),
-        "randomwalk" => Ok(IntegratorKind::RandomWalk),
-        "ambientocclusion" | "ao" => {
-            Ok(IntegratorKind::AmbientOcclusion { cos_sample: true, max_distance: f32::INFINITY })
-        }
-        _ => Err(match irradiant::scene::diagnostic::did_you_mean(text, known) {
-            Some(near) => format!("did you mean \"{near}\"?"),
-            None => format!("known are {}", known.join(", ")),
-        }),
+        "help" => Ok(IntegratorArgument::Help),
+        _ => IntegratorChoice::named(text).map(IntegratorArgument::Choice).map_err(|why| why.to_string()),
     }
 }
 
@@ -166,7 +177,7 @@ mod tests {
         for bad in ["0,1,0", "1,0,0,1", "0,2,0,1", "0,x,0,1"] {
             assert!(parse_crop(bad).is_err(), "{bad}");
         }
-        assert_eq!(parse_integrator("pth").unwrap_err(), "did you mean \"path\"?");
+        assert!(parse_integrator("pth").unwrap_err().contains("did you mean \"path\"?"));
         assert_eq!(parse_max_depth("none").unwrap(), MaxDepth::None);
     }
 }

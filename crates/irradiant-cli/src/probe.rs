@@ -25,7 +25,7 @@ pub struct ProbeArguments {
     #[arg(long, value_name = "I", default_value_t = 0)]
     sample: u32,
     #[command(flatten)]
-    picture: PictureOptions,
+    pub picture: PictureOptions,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +72,10 @@ fn probe(arguments: &ProbeArguments) -> Result<(), Error> {
         )));
     }
     let Some(integrator) = job.path_integrator() else {
-        return Err(Error::Settings("probe replays the path integrator; add --integrator path".into()));
+        return Err(Error::Settings(format!(
+            "probe replays the path integrator, not {}; add --integrator path",
+            job.integrator_choice().name()
+        )));
     };
     let sample = camera_sample(scene, [x, y], arguments.sample);
     println!("{} pixel {x},{y} sample {} seed {}", file.name, arguments.sample, scene.seed);

@@ -23,7 +23,7 @@ pub struct RenderArguments {
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     #[command(flatten)]
-    picture: PictureOptions,
+    pub picture: PictureOptions,
     /// Stop after this time (60s, 5m, 1h) with what is there
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time: Option<Duration>,
@@ -262,6 +262,12 @@ fn replay_flags(rendering: &Rendering, arguments: &RenderArguments) -> String {
     if picture.resolution.is_some() || arguments.preview {
         let [width, height] = rendering.film.full_resolution();
         flags += &format!(" --resolution {width}x{height}");
+    }
+    if picture.integrator.is_some() {
+        flags += " --integrator path";
+    }
+    for words in &picture.estimator {
+        flags += &format!(" --estimator {words}");
     }
     match picture.max_depth {
         Some(MaxDepth::None) => flags += " --max-depth none",

@@ -58,6 +58,33 @@ fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+#[test]
+fn integrators_are_listed_with_their_options_and_named_in_the_header() {
+    let folder = Folder::new("integrators");
+    folder.write("scene.pbrt", SCENE);
+    let list = stdout(&folder.run(&["integrators"]));
+    assert_eq!(list, stdout(&folder.run(&["render", "--integrator", "help"])));
+    for word in ["path", "randomwalk", "samplebsdf=true", "lightsampler=scene", "exhaustive"] {
+        assert!(list.contains(word), "{word} is not listed");
+    }
+    let output = folder.run(&[
+        "render",
+        "scene.pbrt",
+        "-q",
+        "-o",
+        "x.exr",
+        "--integrator",
+        "simplepath",
+        "--estimator",
+        "samplebsdf=false",
+    ]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
+    let header = String::from_utf8_lossy(&bytes);
+    assert!(header.contains("simplepath samplelights=true samplebsdf=false lightsampler=scene"), "not in the header");
+    assert!(header.contains("delta lobes"), "the label does not say what is left out");
+}
+
 const SMALL: [&str; 4] = ["--resolution", "24x24", "--spp", "2"];
 const SCENE: &str = "Film \"rgb\" \"integer xresolution\" 16 \"integer yresolution\" 12 \"string filename\" \"deep/ball.exr\"\nCamera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\nTranslate 0 0 3\nShape \"sphere\"\n";
 
@@ -123,6 +150,10 @@ fn exit_codes_tell_who_can_fix_it() {
         (&["render", "mesh.pbrt"], 66, "gone.ply"),
         (&["render", "ok.pbrt", "--max-dept", "3"], 2, "--max-depth"),
         (&["render", "ok.pbrt", "--integrator", "pth"], 2, "did you mean"),
+        (&["render", "ok.pbrt", "--estimator", "lightsampler=treee"], 2, "bvh"),
+        (&["render", "ok.pbrt", "--integrator", "simplepath", "--estimator", "samplebdsf=true"], 2, "samplebsdf"),
+        (&["probe", "ok.pbrt", "--pixel", "1,1", "--integrator", "randomwalk"], 2, "--integrator path"),
+        (&["integrators", "simplpath"], 2, "did you mean \"simplepath\"?"),
         (&["render", "ok.pbrt", "-o", "x.gif"], 2, ".exr"),
         (&["render", "ok.pbrt", "-o", "nowhere/x.exr"], 2, "nowhere"),
         (&["render", "ok.pbrt", "--crop", "0,2,0,1"], 2, "crop"),
@@ -275,6 +306,7 @@ fn versions_and_help_are_there() {
         "--resolution",
         "--crop",
         "--integrator",
+        "--estimator",
         "--max-depth",
         "--color",
         "--exposure",

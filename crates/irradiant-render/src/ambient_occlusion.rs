@@ -2,6 +2,7 @@
 
 use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::registry::{IntegratorEntry, OptionEntry, OptionRange, Value};
 use irradiant_core::film::FilmTile;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Frame, warp};
@@ -16,6 +17,33 @@ pub struct AmbientOcclusionIntegrator {
     /// Occluders farther than this do not count, scene units.
     pub max_distance: f32,
 }
+
+/// By name.
+pub const ENTRY: IntegratorEntry = IntegratorEntry {
+    name: "ambientocclusion",
+    promise: "the fraction of the hemisphere above the first surface that is open",
+    source: "pbrt-v4's ambientocclusion",
+    options: &[
+        OptionEntry {
+            name: "cossample",
+            range: OptionRange::Flag,
+            default: Value::Flag(true),
+            doc: "cosine-weighted directions (else uniform); the result is the same",
+        },
+        OptionEntry {
+            name: "maxdistance",
+            range: OptionRange::Number(0.0, f32::INFINITY),
+            default: Value::Number(f32::INFINITY),
+            doc: "occluders farther than this do not count, scene units",
+        },
+    ],
+    make: |options, _| {
+        Box::new(AmbientOcclusionIntegrator {
+            cos_sample: options.flag("cossample"),
+            max_distance: options.number("maxdistance"),
+        })
+    },
+};
 
 impl Integrator for AmbientOcclusionIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {

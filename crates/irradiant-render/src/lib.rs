@@ -1,8 +1,8 @@
 //! What walks the scene: integrators, scheduling and sessions.
 //!
 //! # Layout
-//! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`record`] (what a path tells of
-//! itself), then [`schedule`] and [`session`]: which work, and who does it.
+//! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`registry`] (all by name, with options), [`record`]
+//! (what a path tells of itself), then [`schedule`] and [`session`]: which work, and who does it.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -13,6 +13,7 @@ pub mod integrator;
 pub mod path;
 pub mod random_walk;
 pub mod record;
+pub mod registry;
 pub mod schedule;
 pub mod session;
 pub mod simple_path;

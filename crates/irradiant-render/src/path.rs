@@ -43,6 +43,26 @@ impl Integrator for PathIntegrator {
     }
 }
 
+/// By name.
+pub const ENTRY: crate::registry::IntegratorEntry = {
+    use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
+    IntegratorEntry {
+        name: "path",
+        promise: "the production estimator: path tracing with multiple importance sampling and roulette on the throughput",
+        source: "A52 with B32; Veach and Guibas 1995",
+        options: &[
+            OptionEntry {
+                name: "regularize",
+                range: OptionRange::Flag,
+                default: Value::Flag(false),
+                doc: "blur sharp lobes after the first non-specular bounce; biased",
+            },
+            LIGHT_SAMPLER,
+        ],
+        make: |options, max_depth| Box::new(PathIntegrator { max_depth, regularize: options.flag("regularize") }),
+    }
+};
+
 /// Where the last scattering event was, for weighing a light that the next ray meets.
 struct Previous {
     reference: ReferencePoint,

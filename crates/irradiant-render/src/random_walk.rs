@@ -3,6 +3,7 @@
 
 use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::registry::IntegratorEntry;
 use crate::simple_path::environment;
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::film::FilmTile;
@@ -17,6 +18,15 @@ pub struct RandomWalkIntegrator {
     /// Scattering events at most; `None`: ended by roulette alone.
     pub max_depth: Option<u32>,
 }
+
+/// By name.
+pub const ENTRY: IntegratorEntry = IntegratorEntry {
+    name: "randomwalk",
+    promise: "uniform random directions at every vertex, emission counted where it is met",
+    source: "pbrt-v4's randomwalk; A43 without importance sampling",
+    options: &[],
+    make: |_, max_depth| Box::new(RandomWalkIntegrator { max_depth }),
+};
 
 impl Integrator for RandomWalkIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {

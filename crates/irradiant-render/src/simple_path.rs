@@ -3,6 +3,7 @@
 
 use crate::camera_samples::for_each_sample;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
 use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::film::FilmTile;
 use irradiant_core::interaction::ReferencePoint;
@@ -23,6 +24,35 @@ pub struct SimplePathIntegrator {
     /// Sample directions by the BSDF (else uniformly).
     pub sample_bsdf: bool,
 }
+
+/// By name.
+pub const ENTRY: IntegratorEntry = IntegratorEntry {
+    name: "simplepath",
+    promise: "path tracing without multiple importance sampling; light sampling and BSDF sampling can be switched off",
+    source: "pbrt-v4's simplepath",
+    options: &[
+        OptionEntry {
+            name: "samplelights",
+            range: OptionRange::Flag,
+            default: Value::Flag(true),
+            doc: "sample a light at each vertex (else light is found by chance)",
+        },
+        OptionEntry {
+            name: "samplebsdf",
+            range: OptionRange::Flag,
+            default: Value::Flag(true),
+            doc: "sample directions by the BSDF (else uniformly)",
+        },
+        LIGHT_SAMPLER,
+    ],
+    make: |options, max_depth| {
+        Box::new(SimplePathIntegrator {
+            max_depth,
+            sample_lights: options.flag("samplelights"),
+            sample_bsdf: options.flag("samplebsdf"),
+        })
+    },
+};
 
 impl Integrator for SimplePathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {

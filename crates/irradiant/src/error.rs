@@ -44,6 +44,12 @@ fn plural(n: usize, word: &str) -> String {
     format!("{n} {word}{}", if n == 1 { "" } else { "s" })
 }
 
+impl From<irradiant_render::registry::ChoiceError> for Error {
+    fn from(why: irradiant_render::registry::ChoiceError) -> Self {
+        Self::Settings(why.to_string())
+    }
+}
+
 /// Why there is no picture.
 ///
 /// `Debug` is `Display`: a `main` that returns this prints what a person can read.

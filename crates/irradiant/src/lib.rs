@@ -28,7 +28,9 @@ pub use error::{Error, Report};
 pub use header::Header;
 pub use load::{SceneFile, cornell_box, load, load_text};
 pub use render::{Job, Rendering, render};
-pub use settings::{ColorMode, IntegratorChoice, MaxDepth, RenderSettings};
+pub use settings::{ColorMode, MaxDepth, RenderSettings};
+
+pub use irradiant_render::registry::IntegratorChoice;
 
 pub use irradiant_core as core;
 pub use irradiant_formats as formats;

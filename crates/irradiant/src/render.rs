@@ -7,13 +7,10 @@ use crate::settings::{ColorMode, MaxDepth, RenderSettings};
 use irradiant_core::film::{DevelopOptions, Film};
 use irradiant_core::scene::{CompileOptions, Scene};
 use irradiant_image::{FileFormat, Image, ToneOptions, atomic_write};
-use irradiant_render::ambient_occlusion::AmbientOcclusionIntegrator;
 use irradiant_render::path::PathIntegrator;
-use irradiant_render::random_walk::RandomWalkIntegrator;
+use irradiant_render::registry::IntegratorChoice;
 use irradiant_render::session::Finished;
-use irradiant_render::simple_path::SimplePathIntegrator;
 use irradiant_render::{Integrator, Limit, RenderStats, Session, SessionSettings};
-use irradiant_scene::desc::IntegratorKind;
 use irradiant_spectrum::Basis;
 use std::path::Path;
 use std::sync::Arc;
@@ -26,9 +23,8 @@ pub struct Job {
     pub header: Header,
     /// Complaints of reading and compiling (warnings only).
     pub report: Report,
-    integrator: IntegratorKind,
+    integrator: IntegratorChoice,
     max_depth: Option<u32>,
-    regularize: bool,
     session: SessionSettings,
 }
 
@@ -36,7 +32,8 @@ impl Job {
     /// Compiles a scene under the settings. All errors at once.
     pub fn new(file: &SceneFile, settings: &RenderSettings) -> Result<Self, Error> {
         let integrator_desc = &file.desc.integrator;
-        let integrator = settings.integrator.unwrap_or(integrator_desc.kind);
+        let chosen = settings.integrator.clone().unwrap_or_else(|| IntegratorChoice::from(integrator_desc));
+        let integrator = settings.estimator.iter().try_fold(chosen, |choice, words| choice.with_words(words))?;
         let max_depth = match settings.max_depth {
             Some(MaxDepth::None) => None,
             Some(MaxDepth::Limit(n)) => Some(n),
@@ -52,6 +49,7 @@ impl Job {
             crop: settings.crop,
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
+            light_sampler: integrator.light_sampler(),
             ..CompileOptions::default()
         };
         if settings.samples_per_pixel == Some(0) {
@@ -71,7 +69,7 @@ impl Job {
         let mut job = Self {
             header: Header {
                 scene_hash: file.hash(),
-                integrator: integrator_name(&integrator),
+                integrator: integrator.to_string(),
                 sampler: scene.sampler.name().into(),
                 color: match settings.color {
                     ColorMode::Spectral => "spectral".into(),
@@ -89,7 +87,6 @@ impl Job {
             report,
             integrator,
             max_depth,
-            regularize: integrator_desc.regularize,
             session: SessionSettings { threads: settings.threads, samples_per_pixel, time_limit: settings.time_limit },
         };
         job.header.estimate = estimate_label(job.integrator().as_ref(), &job.scene);
@@ -98,23 +95,20 @@ impl Job {
 
     /// The integrator, with its limits.
     pub fn integrator(&self) -> Box<dyn Integrator> {
-        let max_depth = self.max_depth;
-        match self.integrator {
-            IntegratorKind::Path => Box::new(PathIntegrator { max_depth, regularize: self.regularize }),
-            IntegratorKind::SimplePath { sample_lights, sample_bsdf } => {
-                Box::new(SimplePathIntegrator { max_depth, sample_lights, sample_bsdf })
-            }
-            IntegratorKind::RandomWalk => Box::new(RandomWalkIntegrator { max_depth }),
-            IntegratorKind::AmbientOcclusion { cos_sample, max_distance } => {
-                Box::new(AmbientOcclusionIntegrator { cos_sample, max_distance })
-            }
-        }
+        self.integrator.integrator(self.max_depth)
+    }
+
+    /// Which integrator, with what options.
+    pub fn integrator_choice(&self) -> &IntegratorChoice {
+        &self.integrator
     }
 
     /// The path integrator that replays samples, if this job uses it.
     pub fn path_integrator(&self) -> Option<PathIntegrator> {
-        matches!(self.integrator, IntegratorKind::Path)
-            .then_some(PathIntegrator { max_depth: self.max_depth, regularize: self.regularize })
+        (self.integrator.name() == "path").then(|| PathIntegrator {
+            max_depth: self.max_depth,
+            regularize: self.integrator.options().flag("regularize"),
+        })
     }
 
     /// Starts rendering.
@@ -193,19 +187,6 @@ pub fn render(file: &SceneFile, settings: &RenderSettings) -> Result<Rendering, 
         return Err(Error::Internal("a render thread stopped; please report the scene".into()));
     }
     Ok(job.rendering(film, stats))
-}
-
-fn integrator_name(kind: &IntegratorKind) -> String {
-    match kind {
-        IntegratorKind::Path => "path".into(),
-        IntegratorKind::SimplePath { sample_lights, sample_bsdf } => {
-            format!("simplepath samplelights={sample_lights} samplebsdf={sample_bsdf}")
-        }
-        IntegratorKind::RandomWalk => "randomwalk".into(),
-        IntegratorKind::AmbientOcclusion { cos_sample, max_distance } => {
-            format!("ambientocclusion cossample={cos_sample} maxdistance={max_distance}")
-        }
-    }
 }
 
 /// "unbiased", or why not: what is left out, what is biased, what else is estimated.

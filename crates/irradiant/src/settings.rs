@@ -1,6 +1,6 @@
 //! What a user may set over what the scene says.
 
-use irradiant_scene::desc::IntegratorKind;
+use irradiant_render::registry::IntegratorChoice;
 use std::time::Duration;
 
 /// The basis of colour.
@@ -23,9 +23,6 @@ pub enum MaxDepth {
     Limit(u32),
 }
 
-/// An integrator to use instead of the scene's.
-pub type IntegratorChoice = IntegratorKind;
-
 /// Settings of a render; `None` and the default mean what the scene says.
 #[derive(Clone, Debug, Default)]
 pub struct RenderSettings {
@@ -41,8 +38,11 @@ pub struct RenderSettings {
     pub resolution: Option<[u32; 2]>,
     /// The part to render: x0, x1, y0, y1 as fractions of the image.
     pub crop: Option<[f32; 4]>,
-    /// Integrator.
+    /// Integrator, with its options; none of the scene's options remain.
     pub integrator: Option<IntegratorChoice>,
+    /// Options of the integrator (the scene's, if no other is given), each as `key=value`; what
+    /// [`IntegratorChoice::with_words`] takes.
+    pub estimator: Vec<String>,
     /// Depth limit.
     pub max_depth: Option<MaxDepth>,
     /// Basis of colour.

@@ -8,14 +8,14 @@
 mod estimate;
 
 use estimate::{How, assert_agree, assert_is, estimate, film, quad};
-use irradiant::scene::desc::IntegratorKind::{Path, RandomWalk, SimplePath};
-use irradiant::{ColorMode, IntegratorChoice};
+use irradiant::ColorMode;
+use irradiant::scene::desc::IntegratorKind::{self, Path, RandomWalk, SimplePath};
 use irradiant_testkit::{Mean, assert_means_agree};
 
-const LIGHTS_AND_BSDF: IntegratorChoice = SimplePath { sample_lights: true, sample_bsdf: true };
-const LIGHTS_ONLY: IntegratorChoice = SimplePath { sample_lights: true, sample_bsdf: false };
-const BSDF_ONLY: IntegratorChoice = SimplePath { sample_lights: false, sample_bsdf: true };
-const NEITHER: IntegratorChoice = SimplePath { sample_lights: false, sample_bsdf: false };
+const LIGHTS_AND_BSDF: IntegratorKind = SimplePath { sample_lights: true, sample_bsdf: true };
+const LIGHTS_ONLY: IntegratorKind = SimplePath { sample_lights: true, sample_bsdf: false };
+const BSDF_ONLY: IntegratorKind = SimplePath { sample_lights: false, sample_bsdf: true };
+const NEITHER: IntegratorKind = SimplePath { sample_lights: false, sample_bsdf: false };
 
 fn diffuse(r: f32, g: f32, b: f32) -> String {
     format!("Material \"diffuse\" \"rgb reflectance\" [ {r} {g} {b} ]\n")

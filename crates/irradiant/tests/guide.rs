@@ -1,5 +1,6 @@
-//! The scenes in the guide are scenes: each is read without a complaint and renders.
+//! The scenes in the guide are scenes: each is read without a complaint and renders. Its list of estimators is the program's.
 
+use irradiant::renderer::registry::INTEGRATORS;
 use irradiant::{RenderSettings, load_text, render};
 
 /// Fenced blocks marked `pbrt`, with the line that each begins at.
@@ -36,4 +37,19 @@ fn every_scene_in_the_guide_renders() {
         let light: f64 = (0..256).map(|i| picture.film.pixel(i % 16, i / 16).mean()[1]).sum();
         assert!(light > 0.0, "{name}: black");
     }
+}
+
+#[test]
+fn the_guide_lists_the_estimators_that_there_are() {
+    let guide = include_str!("../../../docs/guide/estimators.md").replace("\r\n", "\n");
+    let (_, list) = guide.split_once("-->\n").expect("the list follows a comment");
+    let expected: String = INTEGRATORS.iter().map(|e| e.markdown()).collect();
+    for (i, (is, should)) in list.trim().lines().zip(expected.trim().lines()).enumerate() {
+        assert_eq!(is, should, "line {} of the list; `irradiant integrators --markdown` prints it anew", i + 1);
+    }
+    assert_eq!(
+        list.trim().lines().count(),
+        expected.trim().lines().count(),
+        "`irradiant integrators --markdown` prints the list"
+    );
 }

@@ -7,11 +7,10 @@
 mod estimate;
 
 use estimate::{How, assert_agree, estimate, film, quad};
-use irradiant::IntegratorChoice;
-use irradiant::scene::desc::IntegratorKind::SimplePath;
+use irradiant::scene::desc::IntegratorKind::{self, SimplePath};
 
-const LIGHTS_AND_BSDF: IntegratorChoice = SimplePath { sample_lights: true, sample_bsdf: true };
-const BSDF_ONLY: IntegratorChoice = SimplePath { sample_lights: false, sample_bsdf: true };
+const LIGHTS_AND_BSDF: IntegratorKind = SimplePath { sample_lights: true, sample_bsdf: true };
+const BSDF_ONLY: IntegratorKind = SimplePath { sample_lights: false, sample_bsdf: true };
 
 fn diffuse(r: f32, g: f32, b: f32) -> String {
     format!("Material \"diffuse\" \"rgb reflectance\" [ {r} {g} {b} ]\n")

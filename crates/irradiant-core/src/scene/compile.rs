@@ -13,7 +13,8 @@ use crate::sampler::Sampler;
 use crate::texture::Textures;
 use irradiant_image::{Image, ReadOptions};
 use irradiant_scene::desc::{
-    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilmKind, FilterKind, Randomization, SamplerKind, SceneDesc,
+    CameraKind, ColorSpaceName, FileDesc, FilmDesc, FilmKind, FilterKind, LightSamplerKind, Randomization, SamplerKind,
+    SceneDesc,
 };
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
@@ -32,6 +33,8 @@ pub struct CompileOptions {
     pub samples_per_pixel: Option<u32>,
     /// Seed.
     pub seed: Option<u64>,
+    /// How lights are picked.
+    pub light_sampler: Option<LightSamplerKind>,
     /// Films that would take more memory than this, bytes, are refused before anything is reserved.
     pub max_film_bytes: u64,
 }
@@ -49,6 +52,7 @@ impl Default for CompileOptions {
             crop: None,
             samples_per_pixel: None,
             seed: None,
+            light_sampler: None,
             max_film_bytes: Self::MAX_FILM_BYTES,
         }
     }
@@ -123,7 +127,7 @@ fn compile(
         return None;
     }
     let CompiledCamera { camera, camera_from_world, footprint, .. } = camera;
-    let light_sampler = LightSampler::new(desc.integrator.light_sampler, &lights);
+    let light_sampler = LightSampler::new(options.light_sampler.unwrap_or(desc.integrator.light_sampler), &lights);
     let world_from_render = render_from_world.inverse();
     let camera_from_render = camera_from_world.compose(&world_from_render);
     let layers = LayerPlan::new(&film, space, options.basis, &camera_from_render, &world_from_render);

@@ -14,7 +14,7 @@ use irradiant_testkit::Tiles;
 pub const SIGMAS: f64 = 4.9;
 
 /// How to estimate.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct How {
     /// Samples per pixel.
     pub spp: u32,
@@ -35,8 +35,8 @@ impl How {
     }
 
     /// With another integrator.
-    pub fn by(self, integrator: IntegratorChoice) -> Self {
-        Self { integrator: Some(integrator), ..self }
+    pub fn by(self, integrator: impl Into<IntegratorChoice>) -> Self {
+        Self { integrator: Some(integrator.into()), ..self }
     }
 
     /// With a depth limit.
@@ -54,7 +54,7 @@ impl How {
         RenderSettings {
             samples_per_pixel: Some(self.spp),
             seed: Some(self.seed),
-            integrator: self.integrator,
+            integrator: self.integrator.clone(),
             max_depth: Some(self.max_depth),
             color: self.color,
             threads: 1,
