@@ -224,6 +224,26 @@ fn probe_replays_a_sample() {
 }
 
 #[test]
+fn probe_draws_and_speaks_json() {
+    let folder = Folder::new("probe-json");
+    folder.write("s.pbrt", SCENE);
+    let output = folder.run(&["probe", "s.pbrt", "--pixel", "8,6", "--paths", "3", "--json", "-o", "paths.svg"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(value["paths"].as_array().map(Vec::len), Some(3));
+    let path = &value["paths"][1];
+    assert_eq!(path["sample"], 1);
+    let contribution = &path["contributions"][0];
+    let (product, weight) = (&contribution["product_of_pdfs"], &contribution["density_in_weight"]);
+    let (product, weight) = (product.as_f64().expect("a number"), weight.as_f64().expect("a number"));
+    assert!((product / weight - 1.0).abs() < 1e-4, "{product} {weight}");
+    assert!(std::fs::read_to_string(folder.0.join("paths.svg")).expect("written").starts_with("<svg"));
+    let png = folder.run(&["probe", "s.pbrt", "--pixel", "8,6", "-o", "paths.png"]);
+    assert_eq!(code(&png), 2);
+    assert!(stderr(&png).contains(".svg"), "{}", stderr(&png));
+}
+
+#[test]
 fn check_tells_what_a_scene_holds() {
     let folder = Folder::new("check");
     folder.write("s.pbrt", SCENE);

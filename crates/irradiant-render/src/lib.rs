@@ -9,6 +9,7 @@
 
 pub mod ambient_occlusion;
 pub mod camera_samples;
+pub mod inspect;
 pub mod integrator;
 pub mod path;
 pub mod random_walk;

@@ -18,6 +18,7 @@
 //! The crates below are re-exported under their last names ([`core`], [`image`], ...).
 #![forbid(unsafe_code)]
 
+pub mod drawing;
 mod error;
 mod header;
 mod load;

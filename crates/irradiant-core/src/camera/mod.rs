@@ -59,6 +59,12 @@ impl Offsets {
 }
 
 impl CameraRay {
+    /// A ray that no camera made, of weight 1 and without neighbours: for walking a scene from anywhere. Textures at its
+    /// first hit are filtered as at later ones.
+    pub fn alone(ray: Ray) -> Self {
+        Self { ray, weight: 1.0, offsets: Offsets::ZERO, has_offsets: false }
+    }
+
     /// Where the neighbouring rays meet the tangent plane of the hit, relative to the hit: the changes of position from one
     /// pixel to the next in x and in y, scaled for the number of samples. `None` without neighbours, or where the plane
     /// is seen edge-on.

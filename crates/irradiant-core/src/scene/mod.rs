@@ -87,6 +87,11 @@ impl Scene {
         self.bounds
     }
 
+    /// Width and height of the whole picture, pixels.
+    pub fn resolution(&self) -> [u32; 2] {
+        self.resolution
+    }
+
     /// The alpha test for rays.
     #[inline]
     pub fn alpha(&self) -> SceneAlpha<'_> {
