@@ -1,12 +1,12 @@
-//! Four floats at a time, each lane an unfused IEEE operation.
+//! Four or eight floats at a time, each lane an unfused IEEE operation.
 //!
-//! `Portable` is arrays and loops and is what other architectures get; `Sse` is the x86-64 baseline. Comparisons give
-//! all-ones or all-zeros lanes. `min(a, b)` is `if a < b { a } else { b }` lane by lane, so a NaN in `a` gives `b`.
+//! `Portable` is arrays and loops and is what other architectures get; `Sse` is the x86-64 baseline; `Twice` is two of
+//! either, and `Avx` eight in one register. Comparisons give all-ones or all-zeros lanes. `min(a, b)` is `if a < b { a } else { b }` lane by lane, so a NaN in `a` gives `b`.
 
-use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+use std::ops::{Add, BitAnd, BitOr, Div, IndexMut, Mul, Sub};
 
-/// Four lanes of `f32`.
-pub(crate) trait Four:
+/// Lanes of `f32`.
+pub(crate) trait Lanes:
     Copy
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -15,9 +15,13 @@ pub(crate) trait Four:
     + BitAnd<Output = Self>
     + BitOr<Output = Self>
 {
-    fn load(a: &[f32; 4]) -> Self;
+    /// `[f32; 4]` or `[f32; 8]`.
+    type Array: Copy + IndexMut<usize, Output = f32>;
+    /// One bit for each lane.
+    const ALL: u32;
+    fn load(a: &Self::Array) -> Self;
     fn splat(a: f32) -> Self;
-    fn to_array(self) -> [f32; 4];
+    fn to_array(self) -> Self::Array;
     fn min(self, b: Self) -> Self;
     fn max(self, b: Self) -> Self;
     fn abs(self) -> Self;
@@ -64,7 +68,9 @@ fn all_ones_if(condition: bool) -> f32 {
     f32::from_bits(if condition { u32::MAX } else { 0 })
 }
 
-impl Four for Portable {
+impl Lanes for Portable {
+    type Array = [f32; 4];
+    const ALL: u32 = 0xf;
     #[inline(always)]
     fn load(a: &[f32; 4]) -> Self {
         Self(*a)
@@ -103,6 +109,73 @@ impl Four for Portable {
     }
 }
 
+/// Eight lanes as two times four.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Twice<F>(F, F);
+
+macro_rules! twice_operator {
+    ($trait:ident, $method:ident) => {
+        impl<F: Lanes> $trait for Twice<F> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Self($trait::$method(self.0, b.0), $trait::$method(self.1, b.1))
+            }
+        }
+    };
+}
+twice_operator!(Add, add);
+twice_operator!(Sub, sub);
+twice_operator!(Mul, mul);
+twice_operator!(Div, div);
+twice_operator!(BitAnd, bitand);
+twice_operator!(BitOr, bitor);
+
+impl<F: Lanes<Array = [f32; 4]>> Lanes for Twice<F> {
+    type Array = [f32; 8];
+    const ALL: u32 = 0xff;
+    #[inline(always)]
+    fn load(a: &[f32; 8]) -> Self {
+        let (halves, _) = a.as_chunks::<4>();
+        Self(F::load(&halves[0]), F::load(&halves[1]))
+    }
+    #[inline(always)]
+    fn splat(a: f32) -> Self {
+        Self(F::splat(a), F::splat(a))
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 8] {
+        let ([a, b, c, d], [e, f, g, h]) = (self.0.to_array(), self.1.to_array());
+        [a, b, c, d, e, f, g, h]
+    }
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        Self(self.0.min(b.0), self.1.min(b.1))
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        Self(self.0.max(b.0), self.1.max(b.1))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Self {
+        Self(self.0.lt(b.0), self.1.lt(b.1))
+    }
+    #[inline(always)]
+    fn le(self, b: Self) -> Self {
+        Self(self.0.le(b.0), self.1.le(b.1))
+    }
+    #[inline(always)]
+    fn mask(self) -> u32 {
+        self.0.mask() | self.1.mask() << 4
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx::Avx;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use sse::Sse;
 
@@ -150,7 +223,9 @@ mod sse {
     operator!(BitAnd, bitand, _mm_and_ps);
     operator!(BitOr, bitor, _mm_or_ps);
 
-    impl Four for Sse {
+    impl Lanes for Sse {
+        type Array = [f32; 4];
+        const ALL: u32 = 0xf;
         #[inline(always)]
         fn load(a: &[f32; 4]) -> Self {
             Self(baseline!(_mm_loadu_ps(a.as_ptr())))
@@ -192,47 +267,153 @@ mod sse {
     }
 }
 
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod avx {
+    use super::*;
+    use core::arch::x86_64::*;
+
+    /// Calls intrinsics of AVX.
+    macro_rules! avx {
+        ($e:expr) => {
+            // SAFETY: only code compiled for AVX2 behind a check that the machine has it uses `Avx` (the entry points
+            // of `traverse`), and the only pointers are to whole `[f32; 8]`s, read or written unaligned.
+            // Guard: `avx_lanes_agree_with_portable_ones`.
+            unsafe { $e }
+        };
+    }
+
+    #[derive(Clone, Copy, Debug)]
+    #[repr(transparent)]
+    pub(crate) struct Avx(__m256);
+
+    macro_rules! operator {
+        ($trait:ident, $method:ident, $intrinsic:ident) => {
+            impl $trait for Avx {
+                type Output = Self;
+                #[inline(always)]
+                fn $method(self, b: Self) -> Self {
+                    Self(avx!($intrinsic(self.0, b.0)))
+                }
+            }
+        };
+    }
+    operator!(Add, add, _mm256_add_ps);
+    operator!(Sub, sub, _mm256_sub_ps);
+    operator!(Mul, mul, _mm256_mul_ps);
+    operator!(Div, div, _mm256_div_ps);
+    operator!(BitAnd, bitand, _mm256_and_ps);
+    operator!(BitOr, bitor, _mm256_or_ps);
+
+    impl Lanes for Avx {
+        type Array = [f32; 8];
+        const ALL: u32 = 0xff;
+        #[inline(always)]
+        fn load(a: &[f32; 8]) -> Self {
+            Self(avx!(_mm256_loadu_ps(a.as_ptr())))
+        }
+        #[inline(always)]
+        fn splat(a: f32) -> Self {
+            Self(avx!(_mm256_set1_ps(a)))
+        }
+        #[inline(always)]
+        fn to_array(self) -> [f32; 8] {
+            let mut a = [0.0; 8];
+            avx!(_mm256_storeu_ps(a.as_mut_ptr(), self.0));
+            a
+        }
+        #[inline(always)]
+        fn min(self, b: Self) -> Self {
+            Self(avx!(_mm256_min_ps(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn max(self, b: Self) -> Self {
+            Self(avx!(_mm256_max_ps(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            Self(avx!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
+        }
+        #[inline(always)]
+        fn lt(self, b: Self) -> Self {
+            Self(avx!(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn le(self, b: Self) -> Self {
+            Self(avx!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn mask(self) -> u32 {
+            avx!(_mm256_movemask_ps(self.0)) as u32
+        }
+    }
+}
+
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
 
+    const VALUES: [f32; 12] =
+        [0.0, -0.0, 1.0, -1.5, 1e-40, 3e38, -3e38, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.3, 7.25];
+
     #[test]
     fn sse_lanes_agree_with_portable_ones() {
-        let values = [0.0, -0.0, 1.0, -1.5, 1e-40, 3e38, -3e38, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.3, 7.25];
-        for (i, &a) in values.iter().enumerate() {
-            for &b in &values {
-                let (x, y) = ([a, b, values[(i + 1) % 12], -a], [b, a, 0.5, b]);
-                check::<Portable, Sse>(x, y);
+        for (i, &a) in VALUES.iter().enumerate() {
+            for &b in &VALUES {
+                let (x, y) = ([a, b, VALUES[(i + 1) % 12], -a], [b, a, 0.5, b]);
+                same(&run::<Portable>(x, y), &run::<Sse>(x, y));
+                let (x, y) = ([a, b, b, a, 1.0, b, VALUES[(i + 1) % 12], -a], [b, a, a, 1.0, b, -b, 0.5, b]);
+                same(&run::<Twice<Portable>>(x, y), &run::<Twice<Sse>>(x, y));
             }
         }
     }
 
-    fn check<P: Four, S: Four>(x: [f32; 4], y: [f32; 4]) {
-        fn run<F: Four>(x: [f32; 4], y: [f32; 4]) -> Vec<[f32; 4]> {
-            let (a, b) = (F::load(&x), F::load(&y));
-            let results = [
-                a + b,
-                a - b,
-                a * b,
-                a / b,
-                a & b,
-                a | b,
-                a.min(b),
-                a.max(b),
-                a.abs(),
-                a.lt(b),
-                a.le(b),
-                F::splat(x[1]),
-            ];
-            let mut out: Vec<_> = results.iter().map(|r| r.to_array()).collect();
-            out.push([a.lt(b).mask() as f32, a.mask() as f32, 0.0, 0.0]);
-            out
+    #[test]
+    #[allow(unsafe_code)]
+    fn avx_lanes_agree_with_portable_ones() {
+        #[target_feature(enable = "avx2")]
+        fn compiled(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
+            run::<Avx>(x, y)
         }
-        for (p, s) in run::<P>(x, y).iter().zip(run::<S>(x, y)) {
-            for lane in 0..4 {
+        if !is_x86_feature_detected!("avx2") {
+            return;
+        }
+        for (i, &a) in VALUES.iter().enumerate() {
+            for &b in &VALUES {
+                let (x, y) = ([a, b, b, a, 1.0, b, VALUES[(i + 1) % 12], -a], [b, a, a, 1.0, b, -b, 0.5, b]);
+                // SAFETY: the machine has AVX2.
+                same(&run::<Twice<Portable>>(x, y), &unsafe { compiled(x, y) });
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn run<F: Lanes>(x: F::Array, y: F::Array) -> Vec<F::Array> {
+        let (a, b) = (F::load(&x), F::load(&y));
+        let results = [
+            a + b,
+            a - b,
+            a * b,
+            a / b,
+            a & b,
+            a | b,
+            a.min(b),
+            a.max(b),
+            a.abs(),
+            a.lt(b),
+            a.le(b),
+            F::splat(x[1]),
+            F::splat(a.lt(b).mask() as f32),
+            F::splat(a.mask() as f32),
+        ];
+        results.iter().map(|r| r.to_array()).collect()
+    }
+
+    fn same<A: Copy + AsRef<[f32]>>(portable: &[A], other: &[A]) {
+        for (p, s) in portable.iter().zip(other) {
+            for (p, s) in p.as_ref().iter().zip(s.as_ref()) {
                 // The payload of a NaN is not promised, and sign bits of NaNs only show up through `mask`.
-                let same = p[lane].to_bits() == s[lane].to_bits() || (p[lane].is_nan() && s[lane].is_nan());
-                assert!(same, "{x:?} {y:?}: {p:?} {s:?}");
+                assert!(p.to_bits() == s.to_bits() || (p.is_nan() && s.is_nan()), "{p:?} {s:?}");
             }
         }
     }

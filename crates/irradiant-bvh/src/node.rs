@@ -90,6 +90,18 @@ impl Block {
     /// The bits of an id that are the primitive index.
     pub const INDEX: u32 = Self::LAST - 1;
 
+    /// The corners of the triangle in a lane.
+    #[inline]
+    pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        self.vertices.map(|p| p.map(|c| c[lane]))
+    }
+
+    /// Whether a lane (not the first) is unused, as all after it are.
+    #[inline(always)]
+    pub fn repeats(&self, lane: usize) -> bool {
+        (self.ids[lane] ^ self.ids[lane - 1]) & Self::INDEX == 0
+    }
+
     #[inline(always)]
     pub fn is_last(&self) -> bool {
         self.ids[0] & Self::LAST != 0

@@ -9,7 +9,7 @@
 //! A hit must be farther than the error bound of its own `t` (Pharr et al. 2023, section 6.8.4), so a ray leaving a
 //! surface does not meet it again because of rounding alone. We take differences of plain products where they fuse.
 
-use crate::lanes::Four;
+use crate::lanes::Lanes;
 use crate::node::{BLOCK, Block};
 use crate::ray::Ray;
 
@@ -21,6 +21,10 @@ const fn gamma(n: i32) -> f32 {
     ((n as f64 * UNIT) / (1.0 - n as f64 * UNIT)) as f32
 }
 
+const GAMMA_2: f32 = gamma(2);
+const GAMMA_3: f32 = gamma(3);
+const GAMMA_5: f32 = gamma(5);
+
 /// Edge functions outside this range are evaluated again in `f64`: below, products lose bits; above, they overflow.
 const SMALLEST_EDGE: f32 = 1.0 / (1u128 << 100) as f32;
 const LARGEST_EDGE: f32 = (1u128 << 100) as f32;
@@ -29,24 +33,30 @@ const LARGEST_EDGE: f32 = (1u128 << 100) as f32;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     /// The axes called x, y, z below; z is the one along which the ray moves fastest.
-    axes: [usize; 3],
+    pub axes: [usize; 3],
     /// The ray's origin along those.
-    origin: [f32; 3],
+    pub origin: [f32; 3],
     /// Shears of x and y, scale of z.
-    shear: [f32; 3],
+    pub shear: [f32; 3],
 }
 
 impl Shear {
+    /// The axes of a ray's shear.
     #[inline(always)]
-    pub fn new(ray: &Ray) -> Self {
+    pub fn axes(ray: &Ray) -> [usize; 3] {
         let [x, y, z] = ray.d.map(f32::abs);
-        let axes = if x > y && x > z {
+        if x > y && x > z {
             [1, 2, 0]
         } else if y > z {
             [2, 0, 1]
         } else {
             [0, 1, 2]
-        };
+        }
+    }
+
+    #[inline(always)]
+    pub fn new(ray: &Ray) -> Self {
+        let axes = Self::axes(ray);
         let dz = ray.d[axes[2]];
         Self { axes, origin: axes.map(|a| ray.o[a]), shear: [-ray.d[axes[0]] / dz, -ray.d[axes[1]] / dz, 1.0 / dz] }
     }
@@ -88,11 +98,11 @@ pub(crate) fn intersect(vertices: &[[f32; 3]; 3], shear: &Shear) -> Option<Candi
         let max_y = y0.abs().max(y1.abs()).max(y2.abs());
         let max_z = z0.abs().max(z1.abs()).max(z2.abs());
         let max_e = e0.abs().max(e1.abs()).max(e2.abs());
-        let delta_x = gamma(5) * (max_x + max_z);
-        let delta_y = gamma(5) * (max_y + max_z);
-        let delta_z = gamma(3) * max_z;
-        let delta_e = 2.0 * ((gamma(2) * max_x * max_y + delta_y * max_x) + delta_x * max_y);
-        let delta_t = 3.0 * ((gamma(3) * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
+        let delta_x = GAMMA_5 * (max_x + max_z);
+        let delta_y = GAMMA_5 * (max_y + max_z);
+        let delta_z = GAMMA_3 * max_z;
+        let delta_e = 2.0 * ((GAMMA_2 * max_x * max_y + delta_y * max_x) + delta_x * max_y);
+        let delta_t = 3.0 * ((GAMMA_3 * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
         return (t > delta_t).then_some(Candidate { t, u: e1 * inverse, v: e2 * inverse });
     }
     intersect_in_double(&sheared, sz)
@@ -125,30 +135,50 @@ fn intersect_in_double(sheared: &[[f32; 3]; 3], sz: f32) -> Option<Candidate> {
     (t > delta_t).then_some(Candidate { t: t as f32, u: (e[1] * inverse) as f32, v: (e[2] * inverse) as f32 })
 }
 
-/// Candidates of a block: bit `i` of `mask` says whether lane `i` is one.
-pub(crate) struct Candidates {
+/// Candidates among lanes: bit `i` of `mask` says whether lane `i` is one.
+pub(crate) struct Candidates<F: Lanes> {
     pub mask: u32,
-    pub t: [f32; BLOCK],
-    pub u: [f32; BLOCK],
-    pub v: [f32; BLOCK],
+    pub t: F::Array,
+    pub u: F::Array,
+    pub v: F::Array,
 }
 
-impl Candidates {
-    const NONE: Self = Self { mask: 0, t: [0.0; BLOCK], u: [0.0; BLOCK], v: [0.0; BLOCK] };
-}
-
-/// Four triangles at once: the candidates with `t <= t_far`, bit for bit those of [`intersect`].
+/// Four triangles at once: the candidates with `t <= t_far`, bit for bit those of [`intersect`]; `None` if there are
+/// none, or else perhaps.
 #[inline(always)]
-pub(crate) fn intersect_block<F: Four>(block: &Block, shear: &Shear, t_far: f32) -> Candidates {
-    let [kx, ky, kz] = shear.axes;
-    let [ox, oy, oz] = shear.origin.map(F::splat);
-    let [sx, sy, sz] = shear.shear.map(F::splat);
-    let vertex = |i: usize| {
-        let p = &block.vertices[i];
-        let z = F::load(&p[kz]) - oz;
-        ((F::load(&p[kx]) - ox) + sx * z, (F::load(&p[ky]) - oy) + sy * z, z)
-    };
-    let ((x0, y0, z0), (x1, y1, z1), (x2, y2, z2)) = (vertex(0), vertex(1), vertex(2));
+pub(crate) fn intersect_block<F: Lanes<Array = [f32; BLOCK]>>(
+    block: &Block,
+    shear: &Shear,
+    t_far: f32,
+) -> Option<Candidates<F>> {
+    let [x, y, z] = shear.axes;
+    let [a, b, c] = &block.vertices;
+    let vertices = [
+        [F::load(&a[x]), F::load(&a[y]), F::load(&a[z])],
+        [F::load(&b[x]), F::load(&b[y]), F::load(&b[z])],
+        [F::load(&c[x]), F::load(&c[y]), F::load(&c[z])],
+    ];
+    let three = |[x, y, z]: [f32; 3]| [F::splat(x), F::splat(y), F::splat(z)];
+    let (mut found, strange) = intersect_lanes(vertices, three(shear.origin), three(shear.shear), F::splat(t_far))?;
+    if strange != 0 {
+        again_in_double(block, shear, t_far, strange, &mut found);
+    }
+    Some(found)
+}
+
+/// One triangle or one ray in each lane; `vertices` and `origin` along the axes of the [`Shear`]. Candidates with
+/// `t <= t_far`, bit for bit those of [`intersect`], and a mask of lanes that must be asked with that.
+#[inline(always)]
+pub(crate) fn intersect_lanes<F: Lanes>(
+    vertices: [[F; 3]; 3],
+    [ox, oy, oz]: [F; 3],
+    [sx, sy, sz]: [F; 3],
+    t_far: F,
+) -> Option<(Candidates<F>, u32)> {
+    let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = vertices;
+    let (z0, z1, z2) = (z0 - oz, z1 - oz, z2 - oz);
+    let (x0, x1, x2) = ((x0 - ox) + sx * z0, (x1 - ox) + sx * z1, (x2 - ox) + sx * z2);
+    let (y0, y1, y2) = ((y0 - oy) + sy * z0, (y1 - oy) + sy * z1, (y2 - oy) + sy * z2);
     let e0 = x1 * y2 - y1 * x2;
     let e1 = x2 * y0 - y2 * x0;
     let e2 = x0 * y1 - y0 * x1;
@@ -156,9 +186,9 @@ pub(crate) fn intersect_block<F: Four>(block: &Block, shear: &Shear, t_far: f32)
     let zero = F::splat(0.0);
     let lowest = e0.min(e1).min(e2);
     let highest = e0.max(e1).max(e2);
-    let mut inside = (lowest.lt(zero) & zero.lt(highest)).mask() ^ 0xf;
+    let mut inside = (lowest.lt(zero) & zero.lt(highest)).mask() ^ F::ALL;
     if inside == 0 {
-        return Candidates::NONE;
+        return None;
     }
     let (a0, a1, a2) = (e0.abs(), e1.abs(), e2.abs());
     let far = F::splat(LARGEST_EDGE);
@@ -170,37 +200,39 @@ pub(crate) fn intersect_block<F: Four>(block: &Block, shear: &Shear, t_far: f32)
     let (z0, z1, z2) = (z0 * sz, z1 * sz, z2 * sz);
     let inverse = F::splat(1.0) / ((e0 + e1) + e2);
     let t = ((e0 * z0 + e1 * z1) + e2 * z2) * inverse;
-    inside &= (t.le(F::splat(t_far)) & zero.lt(t)).mask();
+    inside &= (t.le(t_far) & zero.lt(t)).mask();
     if inside | strange == 0 {
-        return Candidates::NONE;
+        return None;
     }
     let max_x = x0.abs().max(x1.abs()).max(x2.abs());
     let max_y = y0.abs().max(y1.abs()).max(y2.abs());
     let max_z = z0.abs().max(z1.abs()).max(z2.abs());
     let max_e = a0.max(a1).max(a2);
-    let g = |n: i32| F::splat(gamma(n));
-    let delta_x = g(5) * (max_x + max_z);
-    let delta_y = g(5) * (max_y + max_z);
-    let delta_z = g(3) * max_z;
-    let delta_e = F::splat(2.0) * ((g(2) * max_x * max_y + delta_y * max_x) + delta_x * max_y);
-    let delta_t = F::splat(3.0) * ((g(3) * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
+    let [g2, g3, g5] = [F::splat(GAMMA_2), F::splat(GAMMA_3), F::splat(GAMMA_5)];
+    let delta_x = g5 * (max_x + max_z);
+    let delta_y = g5 * (max_y + max_z);
+    let delta_z = g3 * max_z;
+    let delta_e = F::splat(2.0) * ((g2 * max_x * max_y + delta_y * max_x) + delta_x * max_y);
+    let delta_t = F::splat(3.0) * ((g3 * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
     inside &= delta_t.lt(t).mask();
-    let mut out =
+    let found =
         Candidates { mask: inside, t: t.to_array(), u: (e1 * inverse).to_array(), v: (e2 * inverse).to_array() };
-    if strange != 0 {
-        again_in_double(block, shear, t_far, strange, &mut out);
-    }
-    out
+    Some((found, strange))
 }
 
 #[cold]
 #[inline(never)]
-fn again_in_double(block: &Block, shear: &Shear, t_far: f32, mut lanes: u32, out: &mut Candidates) {
+fn again_in_double<F: Lanes<Array = [f32; BLOCK]>>(
+    block: &Block,
+    shear: &Shear,
+    t_far: f32,
+    mut lanes: u32,
+    out: &mut Candidates<F>,
+) {
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
-        let vertices = block.vertices.map(|p| p.map(|c| c[lane]));
-        if let Some(hit) = intersect(&vertices, shear).filter(|hit| hit.t <= t_far) {
+        if let Some(hit) = intersect(&block.triangle(lane), shear).filter(|hit| hit.t <= t_far) {
             out.mask |= 1 << lane;
             (out.t[lane], out.u[lane], out.v[lane]) = (hit.t, hit.u, hit.v);
         }

@@ -4,7 +4,7 @@
 //! tree.
 
 use super::gather::Ref;
-use crate::lanes::{Four, Native};
+use crate::lanes::{Lanes, Native};
 
 /// Ranges of this many triangles or fewer are not split: they fit one block.
 const LEAF: usize = 4;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{BuildInput, BuildReport, Mesh};
-use crate::lanes::{Four, Native};
+use crate::lanes::{Lanes, Native};
 
 /// Coordinates beyond this are as good as infinite: boxes are clamped to it for building, so that extents stay finite.
 pub(crate) const FAR: f32 = 1e38;

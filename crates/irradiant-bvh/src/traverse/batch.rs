@@ -1,5 +1,12 @@
 //! Many rays in one call.
 
+#[cfg(target_arch = "x86_64")]
+use super::boxes;
+use super::boxes::Halves;
+use super::packet::{self, GROUP, PACKET};
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::Sse;
+use crate::lanes::{Portable, Twice};
 use crate::level::Level;
 use crate::node::Bvh;
 use crate::ray::{Closest, Leaves, Ray};
@@ -7,7 +14,7 @@ use crate::ray::{Closest, Leaves, Ray};
 impl Bvh {
     /// For each ray what [`intersect`](Self::intersect) gives, to the bit; `out[i]` is the answer for `rays[i]`.
     ///
-    /// Any number of rays in any order; fastest where neighbours in `rays` travel together.
+    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together.
     ///
     /// # Panics
     /// If `rays` and `out` differ in length.
@@ -19,21 +26,67 @@ impl Bvh {
         out: &mut [Option<Closest<L::UserHit>>],
     ) {
         assert_eq!(rays.len(), out.len(), "one answer for each ray");
-        for (ray, out) in rays.iter().zip(out) {
-            *out = self.intersect(level, ray, leaves);
-        }
+        let level = level.min(Level::detect());
+        let packet = |rays: &[Ray], out: &mut [Option<Closest<L::UserHit>>]| match level {
+            Level::Scalar => false,
+            Level::Neon => packet::closest::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => packet::closest::<Twice<Sse>, Halves<Sse>, L>(self, rays, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 | Level::Avx512 => boxes::x86::closest_packet(self, rays, leaves, out),
+            #[cfg(not(target_arch = "x86_64"))]
+            Level::Sse | Level::Avx2 | Level::Avx512 => {
+                packet::closest::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out)
+            }
+        };
+        let single = |ray: &Ray| self.intersect(level, ray, leaves);
+        in_packets(rays, out, packet, single);
     }
 
     /// For each ray what [`occluded`](Self::occluded) says; `out[i]` is the answer for `rays[i]`.
     ///
-    /// Any number of rays in any order; fastest where neighbours in `rays` travel together.
+    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together.
     ///
     /// # Panics
     /// If `rays` and `out` differ in length.
     pub fn occluded_batch<L: Leaves>(&self, level: Level, rays: &[Ray], leaves: &L, out: &mut [bool]) {
         assert_eq!(rays.len(), out.len(), "one answer for each ray");
-        for (ray, out) in rays.iter().zip(out) {
-            *out = self.occluded(level, ray, leaves);
+        let level = level.min(Level::detect());
+        let packet = |rays: &[Ray], out: &mut [bool]| match level {
+            Level::Scalar => false,
+            Level::Neon => packet::any::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => packet::any::<Twice<Sse>, Halves<Sse>, L>(self, rays, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 | Level::Avx512 => boxes::x86::any_packet(self, rays, leaves, out),
+            #[cfg(not(target_arch = "x86_64"))]
+            Level::Sse | Level::Avx2 | Level::Avx512 => {
+                packet::any::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out)
+            }
+        };
+        let single = |ray: &Ray| self.occluded(level, ray, leaves);
+        in_packets(rays, out, packet, single);
+    }
+}
+
+/// Tries packets, then single groups, then single rays; `packet` says whether it has answered.
+#[inline(always)]
+fn in_packets<T>(
+    rays: &[Ray],
+    out: &mut [T],
+    mut packet: impl FnMut(&[Ray], &mut [T]) -> bool,
+    single: impl Fn(&Ray) -> T,
+) {
+    for (rays, out) in rays.chunks(PACKET).zip(out.chunks_mut(PACKET)) {
+        if packet(rays, out) {
+            continue;
+        }
+        for (rays, out) in rays.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
+            if PACKET == GROUP || !packet(rays, out) {
+                for (ray, out) in rays.iter().zip(out) {
+                    *out = single(ray);
+                }
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Eight boxes at once.
 
 use super::PADDING;
-use crate::lanes::Four;
+use crate::lanes::Lanes;
 use crate::node::{Node, WIDTH};
 use crate::ray::Ray;
 
@@ -13,7 +13,7 @@ pub(crate) struct Near(pub [f32; WIDTH]);
 /// A ray prepared for testing boxes.
 pub(crate) trait BoxTest: Copy {
     /// Lanes for triangles.
-    type Four: Four;
+    type Four: Lanes<Array = [f32; 4]>;
     fn new(ray: &Ray) -> Self;
     /// Bit `i` says that the ray enters child `i` before `far`; then `near[i]` says where.
     fn enter(&self, node: &Node, far: f32) -> (u32, Near);
@@ -36,7 +36,7 @@ pub(crate) struct Halves<F> {
     first: [usize; 3],
 }
 
-impl<F: Four> BoxTest for Halves<F> {
+impl<F: Lanes<Array = [f32; 4]>> BoxTest for Halves<F> {
     type Four = F;
 
     #[inline(always)]
@@ -75,11 +75,11 @@ pub(crate) mod x86 {
     use core::arch::x86_64::*;
 
     use super::*;
-    use crate::lanes::Sse;
+    use crate::lanes::{Avx, Sse};
     use crate::level::Level;
     use crate::node::Bvh;
     use crate::ray::{Closest, Leaves};
-    use crate::traverse::walk;
+    use crate::traverse::{packet, walk};
 
     /// One 256-bit register. Made only by the entry points below, on machines with AVX2.
     #[derive(Clone, Copy)]
@@ -174,6 +174,37 @@ pub(crate) mod x86 {
                 unsafe { compiled(bvh, ray, leaves) }
             }
         };
+    }
+
+    /// [`packet::closest`] compiled for AVX2.
+    #[inline]
+    #[allow(unsafe_code)]
+    pub(crate) fn closest_packet<L: Leaves>(
+        bvh: &Bvh,
+        rays: &[Ray],
+        leaves: &L,
+        out: &mut [Option<Closest<L::UserHit>>],
+    ) -> bool {
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [Option<Closest<L::UserHit>>]) -> bool {
+            packet::closest::<Avx, Whole, L>(bvh, rays, leaves, out)
+        }
+        assert!(Level::Avx2 <= Level::detect());
+        // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
+        unsafe { compiled(bvh, rays, leaves, out) }
+    }
+
+    /// [`packet::any`] compiled for AVX2.
+    #[inline]
+    #[allow(unsafe_code)]
+    pub(crate) fn any_packet<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
+            packet::any::<Avx, Whole, L>(bvh, rays, leaves, out)
+        }
+        assert!(Level::Avx2 <= Level::detect());
+        // SAFETY: as above.
+        unsafe { compiled(bvh, rays, leaves, out) }
     }
 
     entry_points!(closest_avx2, any_avx2, Level::Avx2, "avx2,bmi1,bmi2,lzcnt,popcnt");

@@ -7,6 +7,7 @@
 
 mod batch;
 mod boxes;
+mod packet;
 mod scalar;
 mod walk;
 
@@ -112,8 +113,19 @@ impl<U: Copy> Best<U> {
     /// Asks about user primitive `index`.
     #[inline(always)]
     fn offer_user<L: Leaves<UserHit = U>>(&mut self, leaves: &L, ray: &Ray, index: u32) {
-        let t_max = if self.found { self.t.next_up() } else { self.t };
-        if let Some((t, hit)) = leaves.intersect(index, &Ray { t_max, ..*ray })
+        self.offer_user_hit(index, leaves.intersect(index, &self.ray_for_user(ray)));
+    }
+
+    /// The ray to ask about user primitives: equal distances count.
+    #[inline(always)]
+    fn ray_for_user(&self, ray: &Ray) -> Ray {
+        Ray { t_max: if self.found { self.t.next_up() } else { self.t }, ..*ray }
+    }
+
+    /// What user primitive `index` said.
+    #[inline(always)]
+    fn offer_user_hit(&mut self, index: u32, hit: Option<(f32, U)>) {
+        if let Some((t, hit)) = hit
             && self.is_beaten_by(t, Self::USERS + index)
         {
             (self.t, self.rank, self.user, self.found) = (t, Self::USERS + index, Some(hit), true);

@@ -34,10 +34,6 @@ fn entered(node: &Node, ray: &Ray, far: f32) -> impl Iterator<Item = (f32, Child
     list.into_iter().take(n)
 }
 
-fn lane(block: &Block, i: usize) -> [[f32; 3]; 3] {
-    block.vertices.map(|p| p.map(|c| c[i]))
-}
-
 pub(super) fn closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
     if bvh.nodes.is_empty() || !is_proper(ray) {
         return None;
@@ -71,7 +67,7 @@ pub(super) fn closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Clo
             loop {
                 let block = &bvh.blocks[index];
                 for i in 0..BLOCK {
-                    if let Some(hit) = triangle::intersect(&lane(block, i), &shear) {
+                    if let Some(hit) = triangle::intersect(&block.triangle(i), &shear) {
                         best.offer_triangle(leaves, ray, block.ids[i], hit.t, hit.u, hit.v);
                     }
                 }
@@ -116,7 +112,7 @@ pub(super) fn any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
             loop {
                 let block = &bvh.blocks[index];
                 for i in 0..BLOCK {
-                    if let Some(hit) = triangle::intersect(&lane(block, i), &shear)
+                    if let Some(hit) = triangle::intersect(&block.triangle(i), &shear)
                         && hit.t < ray.t_max
                         && counts(leaves, ray, block.ids[i], hit)
                     {

@@ -27,7 +27,7 @@ use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidate, Shear};
 
 /// A stack of children still to visit. The builder guarantees that [`STACK`] entries are enough.
-struct Stack<T> {
+pub(super) struct Stack<T> {
     entries: [MaybeUninit<T>; STACK],
 }
 
@@ -37,12 +37,12 @@ const _: () = assert!(STACK.is_power_of_two());
 
 impl<T: Copy> Stack<T> {
     #[inline(always)]
-    fn new() -> Self {
+    pub fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; STACK] }
     }
 
     #[inline(always)]
-    fn set(&mut self, i: usize, entry: T) {
+    pub fn set(&mut self, i: usize, entry: T) {
         debug_assert!(i < STACK);
         self.entries[i & MASK] = MaybeUninit::new(entry);
     }
@@ -50,7 +50,7 @@ impl<T: Copy> Stack<T> {
     /// The entry at `i`, which was [`set`](Self::set).
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn get(&self, i: usize) -> T {
+    pub fn get(&self, i: usize) -> T {
         // SAFETY: `closest` and `any` ask only below their count of entries, all of which they have set; no tree
         // needs more than `STACK` (`Bvh::build`), so masking never aliases two of them, and every bit pattern of `T`
         // (integers, `Child`) is a value. Guards: `all_levels_agree_with_brute_force`,
@@ -70,12 +70,24 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
     if bvh.nodes.is_empty() || !is_proper(ray) {
         return None;
     }
+    let mut best = Best::new(ray.t_max);
+    closest_below::<B, L>(bvh, Child(0), ray, leaves, &mut best);
+    best.finish()
+}
+
+/// Offers `best` what the ray meets below `child`.
+#[inline(always)]
+pub(super) fn closest_below<B: BoxTest, L: Leaves>(
+    bvh: &Bvh,
+    mut child: Child,
+    ray: &Ray,
+    leaves: &L,
+    best: &mut Best<L::UserHit>,
+) {
     let boxes = B::new(ray);
     let shear = Shear::new(ray);
-    let mut best = Best::new(ray.t_max);
     let mut stack = Stack::new();
     let mut n = 0;
-    let mut child = Child(0);
     loop {
         // Down to a leaf.
         while !child.is_leaf() {
@@ -84,7 +96,7 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
             if mask == 0 {
                 match next(&stack, &mut n, best.t) {
                     Some(c) => child = c,
-                    None => return best.finish(),
+                    None => return,
                 }
                 continue;
             }
@@ -159,11 +171,12 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
         } else {
             loop {
                 let block: &Block = &bvh.blocks[index];
-                let mut hits = triangle::intersect_block::<B::Four>(block, &shear, best.t);
-                while hits.mask != 0 {
-                    let i = hits.mask.trailing_zeros() as usize & 3;
-                    hits.mask &= hits.mask - 1;
-                    best.offer_triangle(leaves, ray, block.ids[i], hits.t[i], hits.u[i], hits.v[i]);
+                if let Some(mut hits) = triangle::intersect_block::<B::Four>(block, &shear, best.t) {
+                    while hits.mask != 0 {
+                        let i = hits.mask.trailing_zeros() as usize & 3;
+                        hits.mask &= hits.mask - 1;
+                        best.offer_triangle(leaves, ray, block.ids[i], hits.t[i], hits.u[i], hits.v[i]);
+                    }
                 }
                 if block.is_last() {
                     break;
@@ -173,7 +186,7 @@ pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -
         }
         match next(&stack, &mut n, best.t) {
             Some(c) => child = c,
-            None => return best.finish(),
+            None => return,
         }
     }
 }
@@ -194,7 +207,7 @@ fn next(stack: &Stack<u64>, n: &mut usize, far: f32) -> Option<Child> {
 
 /// Asks for the first two cache lines of what `child` refers to.
 #[inline(always)]
-fn prefetch(bvh: &Bvh, child: Child) {
+pub(super) fn prefetch(bvh: &Bvh, child: Child) {
     let (start, size) = if child.is_leaf() {
         (bvh.blocks.as_ptr().cast::<u8>(), size_of::<Block>())
     } else {
@@ -208,11 +221,16 @@ pub(super) fn any<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bo
     if bvh.nodes.is_empty() || !is_proper(ray) {
         return false;
     }
+    any_below::<B, L>(bvh, Child(0), ray, leaves)
+}
+
+/// Whether the ray meets anything below `child`.
+#[inline(always)]
+pub(super) fn any_below<B: BoxTest, L: Leaves>(bvh: &Bvh, mut child: Child, ray: &Ray, leaves: &L) -> bool {
     let boxes = B::new(ray);
     let shear = Shear::new(ray);
     let mut stack = Stack::new();
     let mut n = 0;
-    let mut child = Child(0);
     loop {
         let mut index = child.index();
         if !child.is_leaf() {
@@ -245,13 +263,14 @@ pub(super) fn any<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bo
         } else {
             loop {
                 let block: &Block = &bvh.blocks[index];
-                let mut hits = triangle::intersect_block::<B::Four>(block, &shear, ray.t_max);
-                while hits.mask != 0 {
-                    let i = hits.mask.trailing_zeros() as usize & 3;
-                    hits.mask &= hits.mask - 1;
-                    let hit = Candidate { t: hits.t[i], u: hits.u[i], v: hits.v[i] };
-                    if hit.t < ray.t_max && counts(leaves, ray, block.ids[i], hit) {
-                        return true;
+                if let Some(mut hits) = triangle::intersect_block::<B::Four>(block, &shear, ray.t_max) {
+                    while hits.mask != 0 {
+                        let i = hits.mask.trailing_zeros() as usize & 3;
+                        hits.mask &= hits.mask - 1;
+                        let hit = Candidate { t: hits.t[i], u: hits.u[i], v: hits.v[i] };
+                        if hit.t < ray.t_max && counts(leaves, ray, block.ids[i], hit) {
+                            return true;
+                        }
                     }
                 }
                 if block.is_last() {

@@ -138,6 +138,45 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
         }
     }
 
+    fn intersect_many(&self, user: u32, rays: &[bvh::Ray], hits: &mut [Option<(f32, Hit)>]) {
+        let User::Instance(i) = self.group.users[user as usize] else {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.meet(user, ray);
+            }
+            return;
+        };
+        let instance = &self.geometry.shapes.instances[i as usize];
+        let group = &self.geometry.groups[instance.group as usize];
+        let leaves = GroupLeaves { group, ..*self };
+        for (rays, hits) in rays.chunks(MANY).zip(hits.chunks_mut(MANY)) {
+            let (local, mut found) = (rays_to_group(instance, rays), [None; MANY]);
+            group.tree.intersect_batch(self.geometry.level, &local[..rays.len()], &leaves, &mut found[..rays.len()]);
+            for (hit, found) in hits.iter_mut().zip(found) {
+                *hit = found.map(|closest| {
+                    let mut inner = super::hit_of(closest);
+                    inner.instances = [i, inner.instances[0]];
+                    (inner.t, inner)
+                });
+            }
+        }
+    }
+
+    fn occluded_many(&self, user: u32, rays: &[bvh::Ray], out: &mut [bool]) {
+        let User::Instance(i) = self.group.users[user as usize] else {
+            for (ray, out) in rays.iter().zip(out) {
+                *out = self.meet(user, ray).is_some();
+            }
+            return;
+        };
+        let instance = &self.geometry.shapes.instances[i as usize];
+        let group = &self.geometry.groups[instance.group as usize];
+        let leaves = GroupLeaves { group, ..*self };
+        for (rays, out) in rays.chunks(MANY).zip(out.chunks_mut(MANY)) {
+            let local = rays_to_group(instance, rays);
+            group.tree.occluded_batch(self.geometry.level, &local[..rays.len()], &leaves, out);
+        }
+    }
+
     fn accept(&self, triangle: u32, ray: &bvh::Ray, _t: f32, u: f32, v: f32) -> bool {
         let shapes = &self.geometry.shapes;
         let (mesh_index, index) = self.group.triangle(triangle);
@@ -158,6 +197,17 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
         };
         is_there(alpha, ray.o.into(), ray.d.into())
     }
+}
+
+/// As many rays as a tree asks about at once.
+const MANY: usize = 16;
+
+fn rays_to_group(instance: &Instance, rays: &[bvh::Ray]) -> [bvh::Ray; MANY] {
+    let mut local = [bvh::Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; MANY];
+    for (local, ray) in local.iter_mut().zip(rays) {
+        *local = instance.ray_to_group(ray);
+    }
+    local
 }
 
 fn context(p: Point3, n: Vec3, uv: Point2, face: u32) -> TextureContext {
