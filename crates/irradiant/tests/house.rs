@@ -64,6 +64,7 @@ fn markdown() -> Vec<PathBuf> {
         .collect();
     found.extend(files("docs", ".md"));
     found.extend(files("crates", ".md"));
+    found.extend(files("bench", ".md"));
     found.sort();
     found
 }
@@ -135,7 +136,7 @@ fn the_map_names_every_crate_and_folder_and_no_other() {
     let words = code_words(&map);
     let mut wrong = Vec::new();
     for word in &words {
-        let is_path = ["crates/", "docs/", "scenes/", ".ci/"].iter().any(|p| word.starts_with(p));
+        let is_path = ["crates/", "docs/", "scenes/", "bench/", ".ci/"].iter().any(|p| word.starts_with(p));
         if is_path && !word.contains(['*', '<', ' ']) && !root().join(word).exists() {
             wrong.push(format!("named and not there: {word}"));
         }
@@ -268,7 +269,18 @@ fn unsafe_is_forbidden_but_in_the_bvh() {
             }
         }
     }
-    for file in files("crates/irradiant-bvh/src", ".rs") {
+    // The benchmark calls a foreign library in one file, and may nowhere else.
+    let foreign = "bench/src/rays/embree.rs";
+    for file in files("bench/src", ".rs").iter().filter(|f| name(f) != foreign) {
+        if text(file).contains("allow(unsafe_code)") {
+            wrong.push(format!("{}: unsafe code outside of {foreign}", name(file)));
+        }
+    }
+    let main = text(&root().join("bench/src/main.rs"));
+    if !main.lines().any(|l| l.trim() == "#![deny(unsafe_code)]") {
+        wrong.push("bench/src/main.rs: no #![deny(unsafe_code)]".into());
+    }
+    for file in files("crates/irradiant-bvh/src", ".rs").into_iter().chain([root().join(foreign)]) {
         let source = text(&file);
         let lines: Vec<&str> = source.lines().collect();
         for (i, line) in lines.iter().enumerate() {
@@ -288,7 +300,8 @@ fn files_are_of_a_size_to_read() {
         let name = name(path);
         name.contains("/data/") || name.ends_with("sobol_directions.rs") || name.ends_with("codes.rs")
     };
-    let long = files("crates", ".rs").into_iter().filter(|f| !is_table(f)).filter_map(|f| {
+    let all = files("crates", ".rs").into_iter().chain(files("bench/src", ".rs"));
+    let long = all.filter(|f| !is_table(f)).filter_map(|f| {
         let lines = text(&f).lines().count();
         (lines > MAX_LINES).then(|| format!("{}: {lines} lines", name(&f)))
     });
@@ -323,7 +336,7 @@ fn nothing_is_left_for_later() {
     // Written in two halves, or this file would find itself.
     let words = [concat!("to", "do!("), concat!("unimple", "mented!("), concat!("#[ig", "nore"), concat!("dbg", "!(")];
     let mut wrong = Vec::new();
-    for file in files("crates", ".rs") {
+    for file in files("crates", ".rs").into_iter().chain(files("bench/src", ".rs")) {
         for (i, line) in text(&file).lines().enumerate() {
             for word in words {
                 if line.contains(word) {

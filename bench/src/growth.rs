@@ -1,0 +1,150 @@
+//! How cost grows with triangles and with lamps.
+
+use crate::Setting;
+use crate::contestant::Contestant;
+use crate::machine::Machine;
+use crate::peers::{self, Contestants};
+use crate::picture::{Mask, Picture, Truth};
+use crate::pictures::write_scene;
+use crate::rays::{self, embree::Embree, on_threads, ours, sets};
+use crate::scene;
+use cpu_time::ThreadTime;
+use irradiant_bvh::Ray;
+use serde::{Deserialize, Serialize};
+
+/// One tracer at one size.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Size {
+    /// Who.
+    pub tracer: String,
+    /// Triangles of the mesh and its floor.
+    pub triangles: usize,
+    /// CPU seconds of the build, one thread.
+    pub build_seconds: f64,
+    /// Nanoseconds per primary ray, one at a time.
+    pub primary: f64,
+    /// Nanoseconds per ray of the first bounce.
+    pub bounce: f64,
+    /// Bytes of nodes and leaves.
+    pub memory_bytes: usize,
+}
+
+/// One renderer with so many lamps.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Lamps {
+    /// Who.
+    pub name: String,
+    /// Lamps.
+    pub lamps: usize,
+    /// CPU microseconds per path.
+    pub microseconds: f64,
+    /// relMSE at 16 samples per pixel, from the scatter of two pictures.
+    pub error: f64,
+    /// Seconds to read and compile the scene, ours only.
+    pub load_seconds: Option<f64>,
+}
+
+/// All of it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Where and when.
+    pub machine: Machine,
+    /// By triangles.
+    pub sizes: Vec<Size>,
+    /// By lamps.
+    pub lamps: Vec<Lamps>,
+    /// What was left out.
+    pub missing: Vec<String>,
+}
+
+/// Nanoseconds per ray, the best of three.
+fn per_ray(rays: &[Ray], trace: impl Fn(&[Ray], &mut [f32])) -> f64 {
+    let mut out = vec![0.0; rays.len()];
+    let mut once = || {
+        let start = ThreadTime::now();
+        trace(rays, &mut out);
+        start.elapsed().as_secs_f64()
+    };
+    let best = (0..3).map(|_| once()).fold(f64::INFINITY, f64::min);
+    best / rays.len() as f64 * 1e9
+}
+
+fn sizes(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Size>, String> {
+    let (libraries, lacking) = rays::libraries(setting);
+    missing.extend(lacking);
+    let mut found = Vec::new();
+    let embrees: Vec<Embree> = libraries.iter().filter_map(|p| Embree::load(p).ok()).collect();
+    for n in [71, 224, 708, 2237] {
+        let subject = sets::displaced(n);
+        let geometry = &subject.geometry;
+        let tree = on_threads(1, || ours::Tree::build(geometry))?;
+        let [primary, bounce, ..] = sets::rays(&subject, &tree, 512);
+        let mut say = |tracer: String, build_seconds, memory_bytes, trace: &dyn Fn(&[Ray], &mut [f32])| {
+            let (primary, bounce) = (per_ray(&primary.rays, trace), per_ray(&bounce.rays, trace));
+            let triangles = geometry.triangles();
+            println!(
+                "{triangles:9} triangles {tracer:12} build {build_seconds:7.3} CPU s, primary {primary:6.1} ns, bounce {bounce:6.1} ns"
+            );
+            found.push(Size { tracer, triangles, build_seconds, primary, bounce, memory_bytes });
+        };
+        say("Irradiant".into(), tree.cpu_seconds, tree.memory_bytes(), &|r, o| tree.closest(r, o));
+        for e in &embrees {
+            let tree = e.build(geometry, false, 1)?;
+            say(format!("Embree {}", e.major), tree.cpu_seconds, tree.memory_bytes(), &|r, o| tree.closest(r, o));
+        }
+    }
+    Ok(found)
+}
+
+fn lamps(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Lamps>, String> {
+    const SPP: u32 = 16;
+    let mut found = Vec::new();
+    for count in [1, 10, 100, 1_000, 10_000, 100_000] {
+        let scene = scene::hall_with_lamps(count);
+        let own = Setting { work: setting.work.join(format!("lamps-{count}")), ..setting.clone() };
+        let folder = write_scene(&scene, &own.work)?;
+        let emission = folder.join("emission.pfm");
+        peers::irradiant(setting, &folder, &["--color", "rgb", "--max-depth", "0"]).render(16, 1, &emission)?;
+        let emission = Picture::read(&emission)?;
+        let mut contestants: Contestants =
+            vec![("Irradiant rgb".into(), Box::new(peers::irradiant(setting, &folder, &["--color", "rgb"])))];
+        // Mitsuba takes minutes to load more.
+        if count <= 10_000 {
+            let (peers, lacking) = peers::all(setting, &folder);
+            contestants.extend(peers.into_iter().filter(|(name, _)| name == "Mitsuba llvm"));
+            missing.extend(lacking);
+        }
+        for (name, contestant) in &mut contestants {
+            let mut pictures = Vec::new();
+            let mut seconds = 0.0;
+            let mut load_seconds = None;
+            for seed in 1..=2 {
+                let out = folder.join(format!("{}-{seed}.pfm", name.replace(' ', "-")));
+                let cost = contestant.render(SPP, seed, &out)?;
+                seconds += cost.cpu_seconds / 2.0;
+                load_seconds = cost.load_seconds.or(load_seconds);
+                pictures.push(Picture::read(&out)?);
+            }
+            let mask = Mask::without_lamps(&emission);
+            let truth = Truth::new(pictures[0].clone(), pictures[1].clone(), mask).ok_or("no pictures")?;
+            let error = truth.scatter(&pictures).unwrap_or(f64::NAN);
+            let microseconds = seconds / (scene.pixels() as f64 * f64::from(SPP)) * 1e6;
+            println!(
+                "{count:7} lamps {name:15} {microseconds:7.3} CPU us per path, relMSE {error:.4}, loaded in {load_seconds:?} s"
+            );
+            found.push(Lamps { name: name.clone(), lamps: count, microseconds, error, load_seconds });
+        }
+    }
+    Ok(found)
+}
+
+/// Measures and prints as it goes.
+pub fn run(setting: &Setting) -> Result<Report, String> {
+    let machine = Machine::here(&setting.repository);
+    let mut missing = Vec::new();
+    let sizes = sizes(setting, &mut missing)?;
+    let lamps = lamps(setting, &mut missing)?;
+    missing.sort();
+    missing.dedup();
+    Ok(Report { machine, sizes, lamps, missing })
+}

@@ -1,0 +1,256 @@
+//! Ray rates against Embree: the same rays for all, interleaved, in one run.
+
+pub mod embree;
+pub mod ours;
+pub mod sets;
+
+use crate::Setting;
+use crate::machine::Machine;
+use cpu_time::ThreadTime;
+use irradiant_bvh::Ray;
+use serde::{Deserialize, Serialize};
+use sets::{Set, Subject};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// One tracer on one set of rays.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Rate {
+    /// Of the scene.
+    pub scene: String,
+    /// Of ray.
+    pub kind: String,
+    /// Who traced.
+    pub tracer: String,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Million rays per CPU second, the best pass.
+    pub best: f64,
+    /// Million rays per CPU second, the median pass.
+    pub median: f64,
+    /// Rays in the set.
+    pub rays: usize,
+    /// Rays whose answer differs from that of Irradiant one at a time: hit against miss, or distances apart by more than 1e-4.
+    pub different: usize,
+}
+
+/// One build.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Build {
+    /// Of the scene.
+    pub scene: String,
+    /// Triangles, instances counted.
+    pub triangles: usize,
+    /// Who built.
+    pub tracer: String,
+    /// Threads allowed.
+    pub threads: usize,
+    /// On the wall, the best of some.
+    pub seconds: f64,
+    /// All threads.
+    pub cpu_seconds: f64,
+    /// Nodes and leaves.
+    pub memory_bytes: usize,
+}
+
+/// All of it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Where and when.
+    pub machine: Machine,
+    /// Passes over each set.
+    pub passes: usize,
+    /// Rates.
+    pub rates: Vec<Rate>,
+    /// Builds.
+    pub builds: Vec<Build>,
+    /// What was left out, and why.
+    pub missing: Vec<String>,
+}
+
+type Trace<'a> = Box<dyn Fn(&Set, &[Ray], &mut [f32]) + Sync + 'a>;
+
+/// CPU seconds of all threads together for one pass.
+fn pass(trace: &Trace, set: &Set, threads: usize, out: &mut [f32]) -> f64 {
+    const CHUNK: usize = 8192;
+    let next = AtomicUsize::new(0);
+    let chunks: Vec<std::sync::Mutex<&mut [f32]>> = out.chunks_mut(CHUNK).map(std::sync::Mutex::new).collect();
+    let work = || {
+        let start = ThreadTime::now();
+        loop {
+            let i = next.fetch_add(1, Relaxed);
+            let Some(out) = chunks.get(i) else { break };
+            let mut out = out.lock().unwrap_or_else(|e| e.into_inner());
+            let n = out.len();
+            trace(set, &set.rays[i * CHUNK..i * CHUNK + n], &mut out);
+        }
+        start.elapsed().as_secs_f64()
+    };
+    if threads == 1 {
+        return work();
+    }
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().map(|w| w.join().unwrap_or(f64::NAN)).sum()
+    })
+}
+
+fn different(truth: &[f32], found: &[f32]) -> usize {
+    let apart = |(&a, &b): (&f32, &f32)| a.is_finite() != b.is_finite() || (a - b).abs() > 1e-4 * a.abs().max(1e-3);
+    truth.iter().zip(found).filter(|&(a, b)| apart((a, b))).count()
+}
+
+/// Libraries of Embree that there are: 4 from the wheel, 3 from Debian.
+pub fn libraries(setting: &Setting) -> (Vec<PathBuf>, Vec<String>) {
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    let wheel = setting.peers.as_ref().and_then(|peers| {
+        let packages = std::fs::read_dir(peers.join("embree/lib")).ok()?;
+        let homes = packages.flatten().map(|e| e.path().join("site-packages/embreex.libs"));
+        let files = homes.filter_map(|h| std::fs::read_dir(h).ok()).flatten().flatten().map(|e| e.path());
+        files.into_iter().find(|p| p.to_string_lossy().contains("libembree4"))
+    });
+    match wheel {
+        Some(path) => found.push(path),
+        None => missing.push("Embree 4.4: no wheel in the folder of --peers".into()),
+    }
+    let debian = ["/usr/lib/x86_64-linux-gnu/libembree3.so.3", "/usr/lib/aarch64-linux-gnu/libembree3.so.3"];
+    match debian.iter().map(PathBuf::from).find(|p| p.exists()) {
+        Some(path) => found.push(path),
+        None => missing.push("Embree 3: Debian's libembree3-3 is not installed".into()),
+    }
+    (found, missing)
+}
+
+/// Runs on a pool of so many threads.
+pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, String> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())?;
+    Ok(pool.install(work))
+}
+
+fn on_subject(
+    subject: &Subject,
+    embrees: &[embree::Embree],
+    passes: usize,
+    width: usize,
+    report: &mut Report,
+) -> Result<(), String> {
+    let geometry = &subject.geometry;
+    println!("{}: {} triangles", subject.name, geometry.triangles());
+    let mut say = |tracer: &str, threads: usize, seconds: f64, cpu_seconds: f64, memory_bytes: usize| {
+        let mb = memory_bytes as f64 / 1e6;
+        println!("  build {tracer:20} {threads} thread(s): {seconds:6.3} s, {cpu_seconds:6.3} CPU s, {mb:6.1} MB");
+        report.builds.push(Build {
+            scene: subject.name.into(),
+            triangles: geometry.triangles(),
+            tracer: tracer.into(),
+            threads,
+            seconds,
+            cpu_seconds,
+            memory_bytes,
+        });
+    };
+    // Each build twice, the quicker one counts.
+    let quicker = |a: (f64, f64), b: (f64, f64)| if a.1 < b.1 { a } else { b };
+    for threads in [1, 2] {
+        let build = || on_threads(threads, || ours::Tree::build(geometry));
+        let (a, b) = (build()?, build()?);
+        let (seconds, cpu) = quicker((a.seconds, a.cpu_seconds), (b.seconds, b.cpu_seconds));
+        say("Irradiant", threads, seconds, cpu, a.memory_bytes());
+        for e in embrees {
+            for robust in [false, true] {
+                let (a, b) = (e.build(geometry, robust, threads)?, e.build(geometry, robust, threads)?);
+                let (seconds, cpu) = quicker((a.seconds, a.cpu_seconds), (b.seconds, b.cpu_seconds));
+                let name = format!("Embree {}{}", e.major, if robust { " robust" } else { "" });
+                say(&name, threads, seconds, cpu, a.memory_bytes());
+            }
+        }
+    }
+    let tree = ours::Tree::build(geometry);
+    let sets = sets::rays(subject, &tree, width);
+    let mut built = Vec::new();
+    for e in embrees {
+        for robust in [false, true] {
+            let name = format!("Embree {}{}", e.major, if robust { " robust" } else { "" });
+            built.push((name, e.build(geometry, robust, 2)?));
+        }
+    }
+    let mut tracers: Vec<(String, Trace)> = Vec::new();
+    let tree = &tree;
+    tracers.push((
+        "Irradiant".into(),
+        Box::new(|set, rays, out| if set.occlusion { tree.occluded(rays, out) } else { tree.closest(rays, out) }),
+    ));
+    tracers.push((
+        "Irradiant batch".into(),
+        Box::new(
+            |set, rays, out| if set.occlusion { tree.occluded_batch(rays, out) } else { tree.closest_batch(rays, out) },
+        ),
+    ));
+    for (name, tree) in &built {
+        tracers.push((
+            name.clone(),
+            Box::new(|set, rays, out| if set.occlusion { tree.occluded(rays, out) } else { tree.closest(rays, out) }),
+        ));
+        tracers.push((
+            format!("{name} x16"),
+            Box::new(|set, rays, out| {
+                if set.occlusion {
+                    tree.occluded16(rays, out, set.coherent);
+                } else {
+                    tree.closest16(rays, out, set.coherent);
+                }
+            }),
+        ));
+    }
+    for set in &sets {
+        for threads in [1, 2] {
+            let mut times: Vec<Vec<f64>> = tracers.iter().map(|_| Vec::new()).collect();
+            let mut answers: Vec<Vec<f32>> = tracers.iter().map(|_| vec![f32::NAN; set.rays.len()]).collect();
+            for _ in 0..passes {
+                for (i, (_, trace)) in tracers.iter().enumerate() {
+                    times[i].push(pass(trace, set, threads, &mut answers[i]));
+                }
+            }
+            for (i, (name, _)) in tracers.iter().enumerate() {
+                times[i].sort_by(f64::total_cmp);
+                let rate = |seconds: f64| set.rays.len() as f64 / seconds / 1e6;
+                let different = different(&answers[0], &answers[i]);
+                let (best, median) = (rate(times[i][0]), rate(times[i][passes / 2]));
+                println!(
+                    "  {:10} {threads} thread(s) {name:20} {best:7.3} Mrays/CPU s (median {median:7.3}), {different} different",
+                    set.kind
+                );
+                report.rates.push(Rate {
+                    scene: subject.name.into(),
+                    kind: set.kind.into(),
+                    tracer: name.clone(),
+                    threads,
+                    best,
+                    median,
+                    rays: set.rays.len(),
+                    different,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Measures on all three scenes and prints as it goes.
+pub fn run(passes: usize, width: usize, setting: &Setting) -> Result<Report, String> {
+    let (libraries, mut missing) = libraries(setting);
+    let mut embrees = Vec::new();
+    for path in &libraries {
+        match embree::Embree::load(path) {
+            Ok(e) => embrees.push(e),
+            Err(why) => missing.push(why),
+        }
+    }
+    missing.iter().for_each(|m| println!("left out: {m}"));
+    let machine = Machine::here(&setting.repository);
+    let mut report = Report { machine, passes, rates: vec![], builds: vec![], missing };
+    for subject in [sets::objects(), sets::displaced(708), sets::instances()] {
+        on_subject(&subject, &embrees, passes, width, &mut report)?;
+    }
+    Ok(report)
+}

@@ -1,0 +1,175 @@
+//! Irradiant's tree over the same geometry.
+
+use super::sets::{Geometry, Placement};
+use crate::vector::{V, add, scale, sub};
+use cpu_time::ProcessTime;
+use irradiant_bvh::{BuildInput, BuildSettings, Bvh, Closest, Hit, Leaves, Level, Mesh, Ray, TrianglesOnly};
+use std::time::Instant;
+
+/// A tree over triangles, or one over instances of such.
+pub struct Tree<'a> {
+    geometry: &'a Geometry,
+    /// One, or one for each mesh that is instanced.
+    parts: Vec<Bvh>,
+    top: Option<Bvh>,
+    level: Level,
+    /// Of the build, on the wall.
+    pub seconds: f64,
+    /// Of the build, all threads.
+    pub cpu_seconds: f64,
+}
+
+struct Instances<'a> {
+    parts: &'a [Bvh],
+    placements: &'a [Placement],
+    level: Level,
+}
+
+impl Instances<'_> {
+    /// The ray in the space of an instance: distances along it stay the same.
+    fn inside(&self, user: u32, ray: &Ray) -> (&Bvh, Ray) {
+        let p = &self.placements[user as usize];
+        let shrink = 1.0 / p.size;
+        let (o, d) = (scale(sub(ray.o, p.origin), shrink), scale(ray.d, shrink));
+        (&self.parts[p.mesh], Ray { o, d, ..*ray })
+    }
+}
+
+impl Leaves for Instances<'_> {
+    type UserHit = Hit;
+
+    fn intersect(&self, user: u32, ray: &Ray) -> Option<(f32, Hit)> {
+        let (part, ray) = self.inside(user, ray);
+        match part.intersect(self.level, &ray, &TrianglesOnly)? {
+            Closest::Triangle(hit) => Some((hit.t, hit)),
+            Closest::User { .. } => None,
+        }
+    }
+
+    fn occluded(&self, user: u32, ray: &Ray) -> bool {
+        let (part, ray) = self.inside(user, ray);
+        part.occluded(self.level, &ray, &TrianglesOnly)
+    }
+}
+
+fn mesh_of(mesh: &crate::scene::Mesh) -> Mesh<'_> {
+    Mesh { positions: &mesh.positions, triangles: &mesh.triangles, filtered: false }
+}
+
+impl<'a> Tree<'a> {
+    /// Builds on the current pool of threads.
+    pub fn build(geometry: &'a Geometry) -> Self {
+        let settings = BuildSettings::default();
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let over = |meshes: &[Mesh]| Bvh::build(&BuildInput { meshes, user_boxes: &[] }, &settings);
+        let meshes: Vec<Mesh> = geometry.meshes.iter().map(mesh_of).collect();
+        let (parts, top) = if geometry.placements.is_empty() {
+            (vec![over(&meshes)], None)
+        } else {
+            let parts: Vec<Bvh> = meshes.iter().map(|m| over(std::slice::from_ref(m))).collect();
+            let place = |p: &Placement| {
+                let bounds = parts[p.mesh].bounds().unwrap_or_default();
+                bounds.map(|corner| add(p.origin, scale(corner, p.size)))
+            };
+            // A box that is scaled and moved is rounded: an ulp or two of slack.
+            let slack = |[lo, hi]: [V; 2]| {
+                let pad = |x: f32, y: f32| 4.0 * f32::EPSILON * (x.abs() + y.abs());
+                [std::array::from_fn(|i| lo[i] - pad(lo[i], hi[i])), std::array::from_fn(|i| hi[i] + pad(lo[i], hi[i]))]
+            };
+            let boxes: Vec<[V; 2]> = geometry.placements.iter().map(|p| slack(place(p))).collect();
+            let top = Bvh::build(&BuildInput { meshes: &[], user_boxes: &boxes }, &settings);
+            (parts, Some(top))
+        };
+        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        Self { geometry, parts, top, level: Level::detect(), seconds, cpu_seconds }
+    }
+
+    /// Bytes of nodes and leaves, and of placements where there are any.
+    pub fn memory_bytes(&self) -> usize {
+        let trees: usize = self.parts.iter().chain(&self.top).map(Bvh::memory_bytes).sum();
+        trees + self.geometry.placements.len() * size_of::<Placement>()
+    }
+
+    fn instances(&self) -> Instances<'_> {
+        Instances { parts: &self.parts, placements: &self.geometry.placements, level: self.level }
+    }
+
+    /// Distance of the closest hit, and the triangle there.
+    pub fn hit(&self, ray: &Ray) -> Option<(f32, [V; 3])> {
+        let corners =
+            |mesh: &crate::scene::Mesh, triangle: usize| mesh.triangles[triangle].map(|i| mesh.positions[i as usize]);
+        let Some(top) = &self.top else {
+            let Closest::Triangle(hit) = self.parts[0].intersect(self.level, ray, &TrianglesOnly)? else { return None };
+            let mut index = hit.primitive as usize;
+            for mesh in &self.geometry.meshes {
+                match index.checked_sub(mesh.triangles.len()) {
+                    Some(rest) => index = rest,
+                    None => return Some((hit.t, corners(mesh, index))),
+                }
+            }
+            return None;
+        };
+        let Closest::User { t, user, hit } = top.intersect(self.level, ray, &self.instances())? else { return None };
+        // Instances are not turned, so that their triangles have the same normals.
+        let placement = &self.geometry.placements[user as usize];
+        Some((t, corners(&self.geometry.meshes[placement.mesh], hit.primitive as usize)))
+    }
+
+    /// Distances to what the rays meet first, infinite for none; one at a time.
+    pub fn closest(&self, rays: &[Ray], out: &mut [f32]) {
+        let distance = |t: Option<f32>| t.unwrap_or(f32::INFINITY);
+        if let Some(top) = &self.top {
+            let leaves = self.instances();
+            let one = |ray| distance(top.intersect(self.level, ray, &leaves).map(|h| h.t()));
+            rays.iter().zip(out).for_each(|(ray, out)| *out = one(ray));
+        } else {
+            let one = |ray| distance(self.parts[0].intersect(self.level, ray, &TrianglesOnly).map(|h| h.t()));
+            rays.iter().zip(out).for_each(|(ray, out)| *out = one(ray));
+        }
+    }
+
+    /// Whether the rays meet anything (1) or not (0), one at a time.
+    pub fn occluded(&self, rays: &[Ray], out: &mut [f32]) {
+        if let Some(top) = &self.top {
+            let leaves = self.instances();
+            let one = |ray| f32::from(top.occluded(self.level, ray, &leaves));
+            rays.iter().zip(out).for_each(|(ray, out)| *out = one(ray));
+        } else {
+            let one = |ray| f32::from(self.parts[0].occluded(self.level, ray, &TrianglesOnly));
+            rays.iter().zip(out).for_each(|(ray, out)| *out = one(ray));
+        }
+    }
+
+    /// As [`Tree::closest`], in batches of 256.
+    pub fn closest_batch(&self, rays: &[Ray], out: &mut [f32]) {
+        let mut triangles = [None; 256];
+        let mut users = [None; 256];
+        let leaves = self.instances();
+        for (rays, out) in rays.chunks(256).zip(out.chunks_mut(256)) {
+            let n = rays.len();
+            if let Some(top) = &self.top {
+                top.intersect_batch(self.level, rays, &leaves, &mut users[..n]);
+                let distance = |h: &Option<Closest<Hit>>| h.map_or(f32::INFINITY, |h| h.t());
+                out.iter_mut().zip(&users).for_each(|(out, h)| *out = distance(h));
+            } else {
+                self.parts[0].intersect_batch(self.level, rays, &TrianglesOnly, &mut triangles[..n]);
+                let distance = |h: &Option<Closest<()>>| h.map_or(f32::INFINITY, |h| h.t());
+                out.iter_mut().zip(&triangles).for_each(|(out, h)| *out = distance(h));
+            }
+        }
+    }
+
+    /// As [`Tree::occluded`], in batches of 256.
+    pub fn occluded_batch(&self, rays: &[Ray], out: &mut [f32]) {
+        let mut any = [false; 256];
+        let leaves = self.instances();
+        for (rays, out) in rays.chunks(256).zip(out.chunks_mut(256)) {
+            let any = &mut any[..rays.len()];
+            match &self.top {
+                Some(top) => top.occluded_batch(self.level, rays, &leaves, any),
+                None => self.parts[0].occluded_batch(self.level, rays, &TrianglesOnly, any),
+            }
+            out.iter_mut().zip(any).for_each(|(out, any)| *out = f32::from(*any));
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The street: what 16 paths per pixel cost, how the error falls, and what the error of 16 independent samples costs.
+
+use crate::Setting;
+use crate::contestant::Contestant;
+use crate::machine::{Machine, load};
+use crate::peers::{self, Contestants};
+use crate::picture::{Mask, Picture, Truth};
+use crate::pictures::{reference, write_scene};
+use crate::scene;
+use serde::{Deserialize, Serialize};
+
+/// One render.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Point {
+    /// Who rendered.
+    pub name: String,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// relMSE.
+    pub error: f64,
+    /// CPU seconds.
+    pub cpu_seconds: f64,
+    /// Load of the machine before.
+    pub load: f64,
+}
+
+/// All of it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Where and when.
+    pub machine: Machine,
+    /// Triangles.
+    pub triangles: usize,
+    /// Pixels.
+    pub resolution: [u32; 2],
+    /// Pixels that see the sky, in per cent.
+    pub masked_percent: f64,
+    /// Samples per pixel of each of two references.
+    pub reference_spp: u32,
+    /// Which two.
+    pub references: String,
+    /// Mean of one over mean of the other.
+    pub reference_ratio: [f64; 3],
+    /// Renders.
+    pub points: Vec<Point>,
+    /// relMSE of Irradiant with 16 independent samples.
+    pub independent_error: f64,
+    /// Samples per pixel that have this error, between those measured.
+    pub equal_error_spp: Option<f64>,
+    /// CPU seconds that they take.
+    pub equal_error_cpu_seconds: Option<f64>,
+    /// What was left out.
+    pub missing: Vec<String>,
+}
+
+/// Where a falling curve of (x, error, cost) crosses an error, on logarithmic scales.
+fn crossing(curve: &[(f64, f64, f64)], error: f64) -> Option<(f64, f64)> {
+    let pair = curve.windows(2).find(|w| w[0].1 >= error && w[1].1 <= error)?;
+    let k = (error / pair[0].1).ln() / (pair[1].1 / pair[0].1).ln();
+    let between = |a: f64, b: f64| a * (b / a).powf(k);
+    Some((between(pair[0].0, pair[1].0), between(pair[0].2, pair[1].2)))
+}
+
+/// Renders and prints as it goes.
+pub fn run(reference_spp: u32, setting: &Setting) -> Result<Report, String> {
+    let machine = Machine::here(&setting.repository);
+    let scene = scene::by_name("street").ok_or("no street")?;
+    let folder = write_scene(&scene, &setting.work)?;
+    println!("street: {} triangles, {:?} pixels", scene.triangles(), scene.resolution);
+    let (mut peers, missing) = peers::all(setting, &folder);
+    peers.retain(|(name, _)| name == "Mitsuba llvm");
+    let rgb: &[&str] = &["--color", "rgb"];
+    let emission = folder.join("emission.pfm");
+    peers::irradiant(setting, &folder, &["--color", "rgb", "--max-depth", "0"]).render(16, 1, &emission)?;
+    let mask = Mask::without_lamps(&Picture::read(&emission)?);
+    let mut ours = peers::irradiant(setting, &folder, rgb);
+    let first = reference("irradiant", &mut ours, reference_spp, &folder)?;
+    let (second, references) = match peers.first_mut() {
+        Some((_, m)) => (reference("mitsuba", m.as_mut(), reference_spp, &folder)?, "Irradiant rgb and Mitsuba llvm"),
+        None => (reference("irradiant-again", &mut ours.other_seeds(), reference_spp, &folder)?, "Irradiant rgb twice"),
+    };
+    let truth = Truth::new(first, second, mask).ok_or("no reference")?;
+    // The same scene with independent samples.
+    let independent = folder.join("independent");
+    scene::pbrt::link(&folder, &independent, "zsobol", "independent")?;
+    let mut contestants: Contestants = vec![
+        ("Irradiant rgb".into(), Box::new(ours)),
+        ("Irradiant spectral".into(), Box::new(peers::irradiant(setting, &folder, &["--color", "spectral"]))),
+        ("Irradiant independent".into(), Box::new(peers::irradiant(setting, &independent, rgb))),
+    ];
+    contestants.append(&mut peers);
+    let mut points = Vec::new();
+    for spp in [1, 2, 4, 8, 16, 32] {
+        for (name, contestant) in &mut contestants {
+            if spp != 16 && name != "Irradiant rgb" && !(name == "Mitsuba llvm" && spp == 4) {
+                continue;
+            }
+            let out = folder.join(format!("{}-{spp}.pfm", name.replace(' ', "-")));
+            let before = load();
+            let cost = contestant.render(spp, 1, &out)?;
+            let error = truth.relative_error(&Picture::read(&out)?);
+            let rate = scene.pixels() as f64 * f64::from(spp) / cost.cpu_seconds / 1e6;
+            println!(
+                "  {name:22} {spp:3} spp: relMSE {error:.5}, {:6.2} CPU s, {rate:6.3} Mpaths/CPU s, load {before:.1}",
+                cost.cpu_seconds
+            );
+            points.push(Point { name: name.clone(), spp, error, cpu_seconds: cost.cpu_seconds, load: before });
+        }
+    }
+    let find = |name: &str| points.iter().filter(|p| p.name == name).collect::<Vec<_>>();
+    let independent_error = find("Irradiant independent").first().map_or(f64::NAN, |p| p.error);
+    let curve: Vec<_> = find("Irradiant rgb").iter().map(|p| (f64::from(p.spp), p.error, p.cpu_seconds)).collect();
+    let crossed = crossing(&curve, independent_error);
+    Ok(Report {
+        machine,
+        triangles: scene.triangles(),
+        resolution: scene.resolution,
+        masked_percent: 100.0 * (1.0 - truth.mask().len() as f64 / scene.pixels() as f64),
+        reference_spp,
+        references: references.into(),
+        reference_ratio: truth.agreement().0,
+        points,
+        independent_error,
+        equal_error_spp: crossed.map(|c| c.0),
+        equal_error_cpu_seconds: crossed.map(|c| c.1),
+        missing,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::crossing;
+
+    #[test]
+    fn the_crossing_of_a_power_law_is_exact() {
+        // error = 1 / x, cost = 3 x.
+        let curve: Vec<_> = [1.0, 4.0, 16.0].iter().map(|&x| (x, 1.0 / x, 3.0 * x)).collect();
+        let (x, cost) = crossing(&curve, 0.125).unwrap();
+        assert!((x - 8.0f64).abs() < 1e-9 && (cost - 24.0f64).abs() < 1e-9);
+        assert_eq!(crossing(&curve, 0.01), None);
+    }
+}
