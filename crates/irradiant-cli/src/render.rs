@@ -114,6 +114,13 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
             .map_err(|why| Error::Output { path: path.clone(), why })?;
     }
     report_refused(&rendering, arguments);
+    let stopped = rendering.stats.stopped_paths;
+    if stopped > 0 && !arguments.quiet {
+        say!(
+            "{stopped} paths were ended by the safety stop of {}; what they would have found is missing",
+            job.integrator_choice()
+        );
+    }
     if let (false, Some([least, most])) = (arguments.quiet, rendering.header.samples_taken) {
         say!("stopped early: {least} to {most} of {} samples per pixel", rendering.header.samples_per_pixel);
     }

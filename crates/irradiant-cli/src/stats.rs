@@ -69,6 +69,8 @@ impl Clock {
             },
             "mean_path_length": if stats.paths > 0 { stats.scatterings as f64 / stats.paths as f64 } else { 0.0 },
             "longest_path": stats.longest_path,
+            "stopped_paths": stats.stopped_paths,
+            "rays_by_depth": stats.rays_by_depth,
             "peak_memory_bytes": peak_memory_bytes(),
         })
     }

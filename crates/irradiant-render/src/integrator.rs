@@ -28,6 +28,11 @@ pub struct RenderStats {
     pub scatterings: u64,
     /// Most scattering events on one path.
     pub longest_path: u32,
+    /// Paths that a safety stop ended, whose light beyond it is missing (integrators without roulette).
+    pub stopped_paths: u64,
+    /// Closest-hit rays by the number of scattering events before them, up to [`RenderStats::MAX_DEPTHS`] of them; filled by the lectures'
+    /// estimators only.
+    pub rays_by_depth: Vec<u64>,
     /// The first few refused samples: pixel x, y, sample index.
     pub refused: Vec<(i32, i32, u32)>,
 }
@@ -35,6 +40,8 @@ pub struct RenderStats {
 impl RenderStats {
     /// At most this many refused samples are located.
     pub const MAX_REFUSED: usize = 16;
+    /// Rays after as many events as this are not counted by depth.
+    pub const MAX_DEPTHS: usize = 64;
 }
 
 impl AddAssign<&RenderStats> for RenderStats {
@@ -45,6 +52,11 @@ impl AddAssign<&RenderStats> for RenderStats {
         self.shadow_rays += other.shadow_rays;
         self.scatterings += other.scatterings;
         self.longest_path = self.longest_path.max(other.longest_path);
+        self.stopped_paths += other.stopped_paths;
+        if self.rays_by_depth.len() < other.rays_by_depth.len() {
+            self.rays_by_depth.resize(other.rays_by_depth.len(), 0);
+        }
+        self.rays_by_depth.iter_mut().zip(&other.rays_by_depth).for_each(|(mine, theirs)| *mine += theirs);
         self.refused.extend_from_slice(&other.refused);
         // Sorted before cutting, so that the list does not depend on which thread came first more than it must.
         self.refused.sort_unstable();

@@ -1,8 +1,8 @@
 //! What walks the scene: integrators, scheduling and sessions.
 //!
 //! # Layout
-//! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`registry`] (all by name, with options), [`record`]
-//! (what a path tells of itself), then [`schedule`] and [`session`]: which work, and who does it.
+//! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`lectures`] (the slides' own estimators), [`registry`]
+//! (all by name, with options), [`record`] (what a path tells of itself), then [`schedule`] and [`session`]: which work, and who does it.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -11,6 +11,7 @@ pub mod ambient_occlusion;
 pub mod camera_samples;
 pub mod inspect;
 pub mod integrator;
+pub mod lectures;
 pub mod path;
 pub mod random_walk;
 pub mod record;

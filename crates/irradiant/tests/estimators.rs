@@ -7,7 +7,7 @@
 
 mod estimate;
 
-use estimate::{How, assert_agree, assert_is, estimate, film, quad};
+use estimate::{How, INSIDE, assert_agree, assert_is, cube, diffuse, estimate, film, lit_box, quad};
 use irradiant::ColorMode;
 use irradiant::scene::desc::IntegratorKind::{self, Path, RandomWalk, SimplePath};
 use irradiant_testkit::{Mean, assert_means_agree};
@@ -16,43 +16,6 @@ const LIGHTS_AND_BSDF: IntegratorKind = SimplePath { sample_lights: true, sample
 const LIGHTS_ONLY: IntegratorKind = SimplePath { sample_lights: true, sample_bsdf: false };
 const BSDF_ONLY: IntegratorKind = SimplePath { sample_lights: false, sample_bsdf: true };
 const NEITHER: IntegratorKind = SimplePath { sample_lights: false, sample_bsdf: false };
-
-fn diffuse(r: f32, g: f32, b: f32) -> String {
-    format!("Material \"diffuse\" \"rgb reflectance\" [ {r} {g} {b} ]\n")
-}
-
-/// The cube from -1 to 1, seen from inside near its front wall, without content.
-fn cube(colors: [[f32; 3]; 6]) -> String {
-    let mut text = String::new();
-    for (i, [r, g, b]) in colors.into_iter().enumerate() {
-        let (axis, side) = (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 });
-        let corner = |u: f32, v: f32| {
-            let mut p = [0.0; 3];
-            p[axis] = side;
-            p[(axis + 1) % 3] = u;
-            p[(axis + 2) % 3] = v;
-            p
-        };
-        text += &diffuse(r, g, b);
-        text += &quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
-    }
-    text
-}
-
-const INSIDE: &str = "LookAt 0 0 -0.95  0 -0.1 0  0 1 0\nCamera \"perspective\" \"float fov\" 70\n";
-
-fn lit_box() -> String {
-    let walls = [[0.7, 0.3, 0.2], [0.2, 0.6, 0.3], [0.7, 0.7, 0.7], [0.5, 0.5, 0.6], [0.6, 0.6, 0.6], [0.7, 0.7, 0.7]];
-    film(8)
-        + INSIDE
-        + "WorldBegin\n"
-        + &cube(walls)
-        + "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 3 2 4 ] \"bool twosided\" true\n"
-        + &quad([[-0.6, 0.7, -0.5], [0.6, 0.7, -0.5], [0.6, 0.6, 0.6], [-0.6, 0.6, 0.6]])
-        + "AttributeEnd\n"
-        + &diffuse(0.4, 0.5, 0.8)
-        + "Translate 0.3 -0.6 0.3\nShape \"sphere\" \"float radius\" 0.4\n"
-}
 
 #[test]
 fn every_integrator_solves_the_diffuse_box() {

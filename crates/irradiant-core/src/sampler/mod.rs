@@ -54,6 +54,8 @@ pub struct ScatterDraws {
 /// Blocks of a vertex: light, scatter, mix.
 const BLOCKS_PER_VERTEX: u32 = 3;
 const CAMERA_BLOCKS: u32 = 2;
+/// Blocks that belong to no vertex; beyond those of vertices, below those of mixes inside mixes.
+const BRANCH_BLOCKS: u32 = 0x1000_0000;
 
 /// A kind of sampler with its settings.
 #[derive(Clone, Debug)]
@@ -187,14 +189,35 @@ impl SampleStream<'_> {
     /// Numbers for light sampling at the vertex after `depth` scattering events.
     #[inline]
     pub fn light(&self, depth: u32) -> LightDraws {
-        let [u, v, pick, resample] = self.block(CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX);
-        LightDraws { pick, uv: Point2::new(u, v), resample }
+        self.light_block(CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX)
     }
 
     /// Numbers for scattering at the vertex after `depth` scattering events.
     #[inline]
     pub fn scatter(&self, depth: u32) -> ScatterDraws {
-        let [u, v, lobe, roulette] = self.block(CAMERA_BLOCKS + 1 + depth * BLOCKS_PER_VERTEX);
+        self.scatter_block(CAMERA_BLOCKS + 1 + depth * BLOCKS_PER_VERTEX)
+    }
+
+    /// Numbers for a light sample beyond the one of each vertex, for estimators that take several; `i` below 2^28 names it among all
+    /// such blocks of the sample.
+    pub fn another_light(&self, i: u32) -> LightDraws {
+        self.light_block(BRANCH_BLOCKS + i)
+    }
+
+    /// Numbers for a direction beyond the one of each vertex, as [`SampleStream::another_light`].
+    pub fn another_scatter(&self, i: u32) -> ScatterDraws {
+        self.scatter_block(BRANCH_BLOCKS + i)
+    }
+
+    #[inline]
+    fn light_block(&self, block: u32) -> LightDraws {
+        let [u, v, pick, resample] = self.block(block);
+        LightDraws { pick, uv: Point2::new(u, v), resample }
+    }
+
+    #[inline]
+    fn scatter_block(&self, block: u32) -> ScatterDraws {
+        let [u, v, lobe, roulette] = self.block(block);
         ScatterDraws { lobe, uv: Point2::new(u, v), roulette }
     }
 

@@ -14,8 +14,19 @@ pub use choice::{ChoiceError, IntegratorChoice, Options, PickLights, Value};
 use crate::integrator::Integrator;
 
 /// What there is, in the order of lists: production first, then the lectures in the order of their slides.
-pub const INTEGRATORS: &[IntegratorEntry] =
-    &[crate::path::ENTRY, crate::simple_path::ENTRY, crate::random_walk::ENTRY, crate::ambient_occlusion::ENTRY];
+pub const INTEGRATORS: &[IntegratorEntry] = &[
+    crate::path::ENTRY,
+    crate::simple_path::ENTRY,
+    crate::random_walk::ENTRY,
+    crate::ambient_occlusion::ENTRY,
+    crate::lectures::direct::ENTRY,
+    crate::lectures::tries::TRY_1,
+    crate::lectures::tries::TRY_2,
+    crate::lectures::partitioned::ENTRY,
+    crate::lectures::distribution::ENTRY,
+    crate::lectures::per_length::ENTRY,
+    crate::lectures::iterative::ENTRY,
+];
 
 /// An integrator that can be asked for by name.
 #[derive(Clone, Copy, Debug)]

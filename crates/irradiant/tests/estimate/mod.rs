@@ -7,6 +7,7 @@
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+use irradiant::renderer::RenderStats;
 use irradiant::{ColorMode, IntegratorChoice, MaxDepth, RenderSettings, load_text, render};
 use irradiant_testkit::Tiles;
 
@@ -73,6 +74,10 @@ pub struct Estimate {
     pub variance: Vec<[f64; 3]>,
     /// Scattering events on the longest path.
     pub longest_path: u32,
+    /// What was done.
+    pub stats: RenderStats,
+    /// What the header says of the estimate.
+    pub label: String,
 }
 
 /// A film of `size` by `size` pixels whose variances are exact.
@@ -97,7 +102,14 @@ pub fn estimate(scene: &str, how: How) -> Estimate {
             variance.push(pixel.variance().map(|v| v / f64::from(how.spp)));
         }
     }
-    Estimate { width: bounds.width(), mean, variance, longest_path: rendering.stats.longest_path }
+    Estimate {
+        width: bounds.width(),
+        mean,
+        variance,
+        longest_path: rendering.stats.longest_path,
+        stats: rendering.stats,
+        label: rendering.header.estimate,
+    }
 }
 
 impl Estimate {
@@ -168,4 +180,44 @@ pub fn assert_is(a: &Estimate, expected: [f64; 3], power: f64, what: &str) {
 pub fn quad(p: [[f32; 3]; 4]) -> String {
     let list = p.iter().flatten().map(f32::to_string).collect::<Vec<_>>().join(" ");
     format!("Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 2 3 0 ] \"point3 P\" [ {list} ]\n")
+}
+
+/// A material.
+pub fn diffuse(r: f32, g: f32, b: f32) -> String {
+    format!("Material \"diffuse\" \"rgb reflectance\" [ {r} {g} {b} ]\n")
+}
+
+/// The cube from -1 to 1, seen from inside near its front wall, without content.
+pub fn cube(colors: [[f32; 3]; 6]) -> String {
+    let mut text = String::new();
+    for (i, [r, g, b]) in colors.into_iter().enumerate() {
+        let (axis, side) = (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 });
+        let corner = |u: f32, v: f32| {
+            let mut p = [0.0; 3];
+            p[axis] = side;
+            p[(axis + 1) % 3] = u;
+            p[(axis + 2) % 3] = v;
+            p
+        };
+        text += &diffuse(r, g, b);
+        text += &quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
+    }
+    text
+}
+
+/// A camera in [`cube`].
+pub const INSIDE: &str = "LookAt 0 0 -0.95  0 -0.1 0  0 1 0\nCamera \"perspective\" \"float fov\" 70\n";
+
+/// A diffuse box with a lamp and a diffuse ball.
+pub fn lit_box() -> String {
+    let walls = [[0.7, 0.3, 0.2], [0.2, 0.6, 0.3], [0.7, 0.7, 0.7], [0.5, 0.5, 0.6], [0.6, 0.6, 0.6], [0.7, 0.7, 0.7]];
+    film(8)
+        + INSIDE
+        + "WorldBegin\n"
+        + &cube(walls)
+        + "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 3 2 4 ] \"bool twosided\" true\n"
+        + &quad([[-0.6, 0.7, -0.5], [0.6, 0.7, -0.5], [0.6, 0.6, 0.6], [-0.6, 0.6, 0.6]])
+        + "AttributeEnd\n"
+        + &diffuse(0.4, 0.5, 0.8)
+        + "Translate 0.3 -0.6 0.3\nShape \"sphere\" \"float radius\" 0.4\n"
 }
