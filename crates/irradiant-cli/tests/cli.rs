@@ -83,6 +83,18 @@ fn integrators_are_listed_with_their_options_and_named_in_the_header() {
     let header = String::from_utf8_lossy(&bytes);
     assert!(header.contains("simplepath samplelights=true samplebsdf=false lightsampler=scene"), "not in the header");
     assert!(header.contains("delta lobes"), "the label does not say what is left out");
+    // Options of the scene's own integrator; and what stands in for it is no matter once another is asked for.
+    folder.write("mlt.pbrt", &format!("Integrator \"mlt\"\n{SCENE}"));
+    let strict = ["render", "mlt.pbrt", "-q", "-o", "y.exr", "--strict"];
+    assert_eq!(code(&folder.run(&strict)), 65);
+    let output = folder.run(&[&strict[..], &["--integrator", "path", "--estimator", "lightsampler=power"]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let output = folder.run(&["render", "mlt.pbrt", "-q", "-o", "z.exr", "--estimator", "lightsampler=power"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    for name in ["y.exr", "z.exr"] {
+        let bytes = std::fs::read(folder.0.join(name)).expect("written");
+        assert!(String::from_utf8_lossy(&bytes).contains("path regularize=false lightsampler=power"), "{name}");
+    }
 }
 
 const SMALL: [&str; 4] = ["--resolution", "24x24", "--spp", "2"];

@@ -173,6 +173,11 @@ impl Diagnostics {
         self.list.iter().filter_map(|d| d.not_honoured.as_deref())
     }
 
+    /// Forgets what was not honoured of a kind that begins so: something else was asked for in its place.
+    pub fn forget_not_honoured(&mut self, kind: &str) {
+        self.list.retain(|d| d.not_honoured.as_ref().is_none_or(|k| !k.starts_with(kind)));
+    }
+
     /// Makes errors of what is not honoured (`--strict`).
     pub fn promote_not_honoured(&mut self) {
         for diagnostic in &mut self.list {
@@ -257,5 +262,9 @@ mod tests {
         }
         assert_eq!(d.error_count(), Diagnostics::MAX_ERRORS);
         assert_eq!(d.not_honoured().count(), 1);
+        d.forget_not_honoured("integrator ");
+        assert_eq!(d.not_honoured().count(), 1);
+        d.forget_not_honoured("medium");
+        assert_eq!((d.not_honoured().count(), d.error_count()), (0, Diagnostics::MAX_ERRORS));
     }
 }

@@ -58,6 +58,10 @@ impl Job {
         let mut report = file.report.clone();
         let compiled = Scene::compile(&file.desc, &file.assets, &options);
         report.diagnostics.extend(compiled.diagnostics);
+        if settings.integrator.is_some() {
+            // The scene's own, and what stands in for it, are not asked.
+            report.diagnostics.forget_not_honoured("integrator ");
+        }
         if settings.strict {
             report.diagnostics.promote_not_honoured();
         }
