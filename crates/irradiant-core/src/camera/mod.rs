@@ -3,7 +3,7 @@
 //! # Layout
 //! In reading order: this file ([`Camera`], [`CameraRay`]); `projective` (perspective and orthographic), `spherical`,
 //! `realistic` (through real glass: `lens`, its `exit_pupil`, its `aperture`); [`footprint`](FootprintEstimator) (how far
-//! apart neighbouring pixels are at a surface); `compile` (from the description).
+//! apart neighbouring pixels are at a surface); `importance` (the camera as light meets it); `compile` (from the description).
 //!
 //! # Conventions
 //! Film positions are in pixels of the full image, (0, 0) at the top left corner, so pixel (x, y) covers x to x + 1. Camera
@@ -15,6 +15,7 @@ mod aperture;
 mod compile;
 mod exit_pupil;
 mod footprint;
+mod importance;
 mod lens;
 mod projective;
 mod realistic;
@@ -24,6 +25,7 @@ mod tests;
 
 pub use compile::{CompiledCamera, compile};
 pub use footprint::FootprintEstimator;
+pub use importance::CameraConnection;
 
 use crate::interaction::Interaction;
 use irradiant_math::elementary::lerp;

@@ -53,6 +53,21 @@ fn lens_axes(lens: ThinLens, space_from_camera: &Transform) -> LensAxes {
         .then(|| [[lens.radius, 0.0, 0.0], [0.0, lens.radius, 0.0]].map(|v| vector(space_from_camera, v)))
 }
 
+/// What both cameras have in common, for finding the place of a point on the film.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Screen {
+    pub origin: Point3,
+    /// From the origin to where film position (0, 0) is focused, or starts if rays are parallel.
+    pub corner: Vec3,
+    /// Steps of a pixel.
+    pub dx: Vec3,
+    pub dy: Vec3,
+    /// Half-axes of the lens.
+    pub lens: Option<[Vec3; 2]>,
+    /// The direction of all rays, if they are parallel.
+    pub parallel: Option<Vec3>,
+}
+
 #[inline]
 fn on_lens(axes: &[Vec3; 2], u: Point2) -> Vec3 {
     let p = uniform_disk_concentric(u);
@@ -97,6 +112,11 @@ impl Perspective {
     /// True when rays depend on a place on the lens.
     pub fn has_lens(&self) -> bool {
         self.lens.is_some()
+    }
+
+    pub fn screen(&self) -> Screen {
+        let Self { origin, corner, dx, dy, lens } = *self;
+        Screen { origin, corner, dx, dy, lens, parallel: None }
     }
 
     #[inline]
@@ -145,6 +165,13 @@ impl Orthographic {
     /// True when rays depend on a place on the lens.
     pub fn has_lens(&self) -> bool {
         self.lens.is_some()
+    }
+
+    /// With a lens its rays are those of a perspective camera whose plane of focus is straight ahead of the film.
+    pub fn screen(&self) -> Screen {
+        let Self { origin, corner, dx, dy, forward, lens } = *self;
+        let (corner, parallel) = if lens.is_some() { (corner + forward, None) } else { (corner, Some(forward)) };
+        Screen { origin, corner, dx, dy, lens, parallel }
     }
 
     #[inline]

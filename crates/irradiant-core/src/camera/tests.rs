@@ -59,7 +59,7 @@ pub(super) fn realistic(aperture_diameter: f32, focus_distance: f32, aperture: A
 pub(super) struct Setup {
     kind: CameraKind,
     resolution: [u32; 2],
-    camera_from_world: MotionDesc,
+    pub camera_from_world: MotionDesc,
     samples: u32,
     space: RenderSpace,
     pub assets: MemoryAssets,

@@ -1,7 +1,7 @@
 //! From sums to an image of averages.
 
 use super::exact::ExactSum;
-use super::{Film, Layer};
+use super::{Film, Layer, SplatEstimate};
 use irradiant_image::Image;
 
 /// What to write beside radiance.
@@ -31,12 +31,16 @@ impl Film {
         let bounds = self.bounds();
         let n_layers = self.channels_per_pixel();
         let mut samples = Vec::with_capacity(bounds.area() * names.len());
+        let splats = self.splats.as_ref().map(|s| (s, self.samples_taken()));
         for (i, pixel) in self.tile.pixels.iter().enumerate() {
-            let mean = pixel.mean();
+            let light = splats.map_or(SplatEstimate::default(), |(plane, n)| plane.estimate(i, n));
+            let own = pixel.mean();
+            let mean: [f64; 3] = std::array::from_fn(|c| own[c] + light.mean[c]);
             samples.extend(mean.map(|x| x as f32));
             let n = pixel.count.max(1) as f64;
             self.develop_layers(&self.tile.layers[i * n_layers..(i + 1) * n_layers], n, &mut samples);
-            let variance = pixel.variance();
+            let own = pixel.variance();
+            let variance: [f64; 3] = std::array::from_fn(|c| own[c] + n * light.variance[c]);
             if options.variance {
                 samples.extend(variance.map(|v| v as f32));
                 samples.extend((0..3).map(|c| {

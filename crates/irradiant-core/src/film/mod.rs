@@ -1,15 +1,19 @@
 //! The film: sums and counts per pixel. Averages exist only in [`Film::develop`].
 //!
 //! There is one film. What varies is which layers it keeps beside radiance ([`Layer`]). Each sample touches exactly
-//! one pixel (reconstruction by filter importance sampling; Ernst et al. 2006), so a tile has one writer.
+//! one pixel (reconstruction by filter importance sampling; Ernst et al. 2006), so a tile has one writer. What paths from
+//! lights bring to other pixels goes to a plane of its own ([`FilmTile::splat`]), which films of other renders lack.
 
 mod develop;
 pub mod exact;
 pub mod filter;
+mod splat;
 
 pub use develop::DevelopOptions;
+pub use splat::SplatEstimate;
 
 use exact::{ExactSum, SquareSum};
+use splat::{Splat, SplatPlane};
 
 /// What a film keeps beside radiance, channel by channel.
 ///
@@ -193,6 +197,8 @@ pub struct FilmTile {
     pixels: Vec<Pixel>,
     layers: Vec<ExactSum>,
     channels_per_pixel: usize,
+    /// For any pixel of the film; empty in a film, which has a plane for them.
+    splats: Vec<Splat>,
 }
 
 impl FilmTile {
@@ -203,6 +209,7 @@ impl FilmTile {
             pixels: vec![Pixel::default(); bounds.area()],
             layers: vec![ExactSum::default(); bounds.area() * channels_per_pixel],
             channels_per_pixel,
+            splats: Vec::new(),
         }
     }
 
@@ -237,6 +244,14 @@ impl FilmTile {
         accepted
     }
 
+    /// Adds what a path from a light brings to a pixel, in the tile or not: linear RGB of the film's colour space, of
+    /// which a pixel shows the mean over all paths from lights, one for each sample of the film. Of one path all at once, or
+    /// the film's error bars are too small. Pixels outside of the film are left out.
+    #[inline]
+    pub fn splat(&mut self, x: i32, y: i32, rgb: [f32; 3]) {
+        self.splats.push(Splat { x, y, rgb });
+    }
+
     /// Adds the sums of a tile of the same bounds and layers.
     pub fn merge(&mut self, other: &FilmTile) {
         debug_assert_eq!((self.bounds, self.channels_per_pixel), (other.bounds, other.channels_per_pixel));
@@ -246,6 +261,7 @@ impl FilmTile {
         for (a, b) in self.layers.iter_mut().zip(&other.layers) {
             *a += *b;
         }
+        self.splats.extend_from_slice(&other.splats);
     }
 
     /// All zero again, for other pixels of the same number; storage kept.
@@ -254,6 +270,7 @@ impl FilmTile {
         self.bounds = bounds;
         self.pixels.fill(Pixel::default());
         self.layers.fill(ExactSum::default());
+        self.splats.clear();
     }
 }
 
@@ -262,9 +279,9 @@ impl FilmTile {
 pub struct FilmTotals {
     /// Samples summed.
     pub samples: u64,
-    /// Samples refused because not finite.
+    /// Samples refused because not finite, and contributions of paths from lights.
     pub not_finite: u64,
-    /// Samples refused because out of range.
+    /// Samples refused because out of range, and contributions of paths from lights.
     pub out_of_range: u64,
     /// Pixels with at least one refused sample.
     pub pixels_with_refused: u64,
@@ -282,13 +299,15 @@ pub struct Film {
     full_resolution: [u32; 2],
     tile: FilmTile,
     layers: Vec<Layer>,
+    /// Once a path from a light has brought something.
+    splats: Option<Box<SplatPlane>>,
 }
 
 impl Film {
     /// An empty film for the pixels `bounds` of an image of `full_resolution`.
     pub fn new(full_resolution: [u32; 2], bounds: PixelBounds, layers: Vec<Layer>) -> Self {
         let channels = layers.iter().map(Layer::n_channels).sum();
-        Self { full_resolution, tile: FilmTile::new(bounds, channels), layers }
+        Self { full_resolution, tile: FilmTile::new(bounds, channels), layers, splats: None }
     }
 
     /// Memory that a film takes for each pixel, bytes, when its layers have so many channels.
@@ -334,6 +353,29 @@ impl Film {
                 self.tile.layers[to * n + i] += tile.layers[from * n + i];
             }
         }
+        if !tile.splats.is_empty() {
+            let n_pixels = self.tile.pixels.len();
+            let plane = self.splats.get_or_insert_with(|| Box::new(SplatPlane::new(n_pixels)));
+            for splat in tile.splats.iter().filter(|s| self.tile.bounds.contains(s.x, s.y)) {
+                plane.add(self.tile.index(splat.x, splat.y), splat.rgb);
+            }
+        }
+    }
+
+    /// True when paths from lights have brought something: pixels then show [`Film::splat_estimate`] too.
+    pub fn has_splats(&self) -> bool {
+        self.splats.is_some()
+    }
+
+    /// What paths from lights make of a pixel, to be added to its own mean. Counts the film's samples at each call.
+    pub fn splat_estimate(&self, x: i32, y: i32) -> SplatEstimate {
+        let index = self.tile.index(x, y);
+        self.splats.as_ref().map_or(SplatEstimate::default(), |s| s.estimate(index, self.samples_taken()))
+    }
+
+    /// Samples of all pixels, refused ones included: each has traced one path from a light, if any has.
+    fn samples_taken(&self) -> u64 {
+        self.tile.pixels.iter().map(|p| u64::from(p.count) + u64::from(p.not_finite) + u64::from(p.out_of_range)).sum()
     }
 
     /// Adds the sums of another film of the same pixels and layers (other samples of the same picture).
@@ -345,6 +387,11 @@ impl Film {
             return Err(FilmMismatch);
         }
         self.tile.merge(&other.tile);
+        match (&mut self.splats, &other.splats) {
+            (Some(a), Some(b)) => a.merge(b),
+            (a @ None, Some(b)) => *a = Some(b.clone()),
+            (_, None) => {}
+        }
         Ok(())
     }
 
@@ -352,7 +399,8 @@ impl Film {
     pub fn totals(&self) -> FilmTotals {
         let mut totals = FilmTotals { min_count: u32::MAX, ..Default::default() };
         let (mut mean, mut error) = (0.0, 0.0);
-        for pixel in &self.tile.pixels {
+        let splats = self.splats.as_ref().map(|s| (s, self.samples_taken()));
+        for (i, pixel) in self.tile.pixels.iter().enumerate() {
             totals.samples += pixel.count as u64;
             totals.not_finite += pixel.not_finite as u64;
             totals.out_of_range += pixel.out_of_range as u64;
@@ -360,9 +408,16 @@ impl Film {
             let taken = pixel.count + pixel.not_finite + pixel.out_of_range;
             totals.min_count = totals.min_count.min(taken);
             totals.max_count = totals.max_count.max(taken);
-            mean += pixel.mean().iter().sum::<f64>();
-            let known = pixel.variance().into_iter().filter(|v| v.is_finite());
-            error += known.map(|v| (v / pixel.count.max(1) as f64).sqrt()).sum::<f64>();
+            let light = splats.map_or(SplatEstimate::default(), |(plane, n)| plane.estimate(i, n));
+            mean += pixel.mean().iter().sum::<f64>() + light.mean.iter().sum::<f64>();
+            let of_mean = pixel.variance().map(|v| v / pixel.count.max(1) as f64);
+            let known = of_mean.into_iter().zip(light.variance).map(|(a, b)| a + b).filter(|v| v.is_finite());
+            error += known.map(f64::sqrt).sum::<f64>();
+        }
+        if let Some((plane, _)) = splats {
+            let [not_finite, out_of_range] = plane.refused();
+            totals.not_finite += not_finite;
+            totals.out_of_range += out_of_range;
         }
         totals.relative_error = if mean > 0.0 { error / mean } else { 0.0 };
         totals.min_count = totals.min_count.min(totals.max_count);

@@ -138,7 +138,7 @@ impl AreaLight {
             radiance,
             wi,
             pdf: s.pdf,
-            target: LightTarget::Surface { p: s.p, p_error: s.p_error, n: s.n },
+            target: LightTarget::Surface { p: s.p, p_error: s.p_error, n: s.n, uv: s.uv },
             is_delta: self.is_delta(),
             alpha,
         })
@@ -205,6 +205,7 @@ impl AreaLight {
             radiance: self.emitted(s.n, s.uv, w, lambda) * factor,
             ray: Ray::new(offset_ray_origin(s.p, s.p_error, s.n, w), w, time),
             normal: s.n,
+            uv: s.uv,
             pdf_position: s.pdf,
             pdf_direction,
             alpha,

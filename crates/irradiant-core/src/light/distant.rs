@@ -47,6 +47,7 @@ impl DistantLight {
             radiance: self.irradiance.sample(lambda),
             ray: self.scene.ray_into(-self.wi, u_position, time),
             normal: Normal3::ZERO,
+            uv: Point2::ZERO,
             pdf_position: 1.0 / self.scene.disk_area(),
             pdf_direction: 1.0,
             alpha: None,

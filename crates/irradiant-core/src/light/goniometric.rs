@@ -80,6 +80,7 @@ impl GoniometricLight {
             radiance: self.intensity.sample(lambda) * self.factor(s.p),
             ray: Ray::new(self.p, self.orientation.to_render(w), time),
             normal: Normal3::ZERO,
+            uv: Point2::ZERO,
             pdf_position: 1.0,
             pdf_direction: s.pdf / (4.0 * PI * self.orientation.stretch(w)),
             alpha: None,

@@ -97,6 +97,8 @@ pub enum LightTarget {
         p_error: Vec3,
         /// Geometric normal.
         n: Normal3,
+        /// Surface parameters, where the light depends on them.
+        uv: Point2,
     },
     /// Out of the scene, along `wi`.
     Infinite,
@@ -155,6 +157,8 @@ pub struct EmittedRay {
     pub ray: Ray,
     /// Of the surface that it leaves, for the cosine; zero where there is none.
     pub normal: Normal3,
+    /// Parameters there, where the light depends on them.
+    pub uv: Point2,
     /// Density of the origin per area; 1 for points.
     pub pdf_position: f32,
     /// Density of the direction per solid angle; 1 for distant lights.
@@ -349,6 +353,22 @@ impl Light {
             Self::UniformInfinite(l) => l.emit(u_position, u_direction, lambda, time),
             Self::ImageInfinite(l) => l.emit(u_position, u_direction, lambda, time),
             Self::PortalInfinite(l) => l.emit(u_position, u_direction, lambda, time),
+        }
+    }
+
+    /// Normal of the surface that rays of a light at infinity are drawn on; zero where they are drawn on disks that face
+    /// them, and for other lights.
+    pub fn emission_normal(&self) -> Normal3 {
+        match self {
+            Self::PortalInfinite(l) => l.normal(),
+            Self::Point(_)
+            | Self::Distant(_)
+            | Self::Spot(_)
+            | Self::Goniometric(_)
+            | Self::Projection(_)
+            | Self::Area(_)
+            | Self::UniformInfinite(_)
+            | Self::ImageInfinite(_) => Normal3::ZERO,
         }
     }
 

@@ -76,6 +76,7 @@ impl PointLight {
             radiance: self.intensity.sample(lambda),
             ray: Ray::new(self.p, w, time),
             normal: Normal3::ZERO,
+            uv: Point2::ZERO,
             pdf_position: 1.0,
             pdf_direction: warp::uniform_sphere_pdf(),
             alpha: None,

@@ -11,7 +11,7 @@ use super::orientation::Orientation;
 use super::{EmittedRay, LightSample, LightTarget};
 use irradiant_math::distribution::WindowedPiecewiseConstant2D;
 use irradiant_math::elementary::{atan2, tan};
-use irradiant_math::{Bounds2, Frame, Point2, Point3, Ray, Vec3, warp};
+use irradiant_math::{Bounds2, Frame, Normal3, Point2, Point3, Ray, Vec3, warp};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -120,6 +120,11 @@ impl PortalInfiniteLight {
         }
     }
 
+    /// The direction in which light passes the portal.
+    pub fn normal(&self) -> Normal3 {
+        -self.frame.normal()
+    }
+
     fn area(&self) -> f32 {
         (self.corners[1] - self.corners[0]).length() * (self.corners[3] - self.corners[0]).length()
     }
@@ -139,7 +144,8 @@ impl PortalInfiniteLight {
         (pdf_direction > 0.0 && pdf_direction.is_finite()).then(|| EmittedRay {
             radiance: self.radiance(s.p, lambda),
             ray: Ray::new(origin, -wi, time),
-            normal: -self.frame.normal(),
+            normal: self.normal(),
+            uv: Point2::ZERO,
             pdf_position: 1.0 / self.area(),
             pdf_direction,
             alpha: None,

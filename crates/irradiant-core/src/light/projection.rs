@@ -127,6 +127,7 @@ impl ProjectionLight {
             radiance: self.image.radiance(self.image.nearest(s.p), lambda) * self.scale,
             ray: Ray::new(self.p, self.orientation.to_render(w), time),
             normal: Normal3::ZERO,
+            uv: Point2::ZERO,
             pdf_position: 1.0,
             pdf_direction: s.pdf
                 / (self.screen.area() * self.screen.solid_angle_by_area(s.p) * self.orientation.stretch(w)),

@@ -99,6 +99,7 @@ impl SpotLight {
             radiance: self.intensity.sample(lambda) * falloff,
             ray: Ray::new(self.p, self.orientation.to_render(w), time),
             normal: Normal3::ZERO,
+            uv: Point2::ZERO,
             pdf_position: 1.0,
             pdf_direction: pdf / self.orientation.stretch(w),
             alpha: None,

@@ -4,6 +4,8 @@
 //! some 60 comparisons here with a chance below 1e-4 when random numbers change. Biases of 1 % (means, most of 0.3 %) are
 //! seen; each test of means asserts so.
 
+mod emitted;
+
 use super::*;
 use crate::geometry::compile_geometry;
 use crate::interaction::MaterialId;

@@ -287,6 +287,17 @@ pub struct Materials {
 const FORCED_DIFFUSE_SAMPLES: u32 = 16;
 
 impl Materials {
+    /// True where there is no surface at all, only a boundary: rays pass it as they are.
+    #[inline]
+    pub fn is_interface(&self, id: MaterialId) -> bool {
+        self.entries.get(id.0 as usize).is_none_or(|entry| matches!(entry.material, Material::Interface))
+    }
+
+    /// Whether any material is an interface.
+    pub fn has_interfaces(&self) -> bool {
+        self.entries.iter().any(|entry| matches!(entry.material, Material::Interface))
+    }
+
     /// How light scatters at a hit; `None` where there is no surface (an interface, or no such material).
     ///
     /// `tex` is how the hit looks to textures. `mix` is asked once per level of mixed materials. May end all wavelengths

@@ -2,7 +2,8 @@
 //!
 //! Numbers come in named blocks of four dimensions ([`CameraDraws`], [`LightDraws`], [`ScatterDraws`]): adding a draw in
 //! one model does not shift all others, and a block's four dimensions are stratified together. [`Sampler::stream`]
-//! names a sample; its methods compute blocks on demand, in any order.
+//! names a sample; its methods compute blocks on demand, in any order. A sample may have a path from a light beside the
+//! one from the camera ([`SampleStream::emission`]).
 //!
 //! All of pbrt-v4's samplers are here by name; where an implementation differs, the variant's doc says how. Expected
 //! values never depend on the sampler.
@@ -51,8 +52,23 @@ pub struct ScatterDraws {
     pub roulette: f32,
 }
 
-/// Blocks of a vertex: light, scatter, mix.
+/// Numbers for the start of a path at a light, each in [0, 1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionDraws {
+    /// Which light.
+    pub pick: f32,
+    /// Where on it.
+    pub position: Point2,
+    /// Which way.
+    pub direction: Point2,
+}
+
+/// Blocks of a vertex: light (of a path from a light: lens), scatter, mix.
 const BLOCKS_PER_VERTEX: u32 = 3;
+/// The first block of the path from a light that belongs to the sample: two for its start, then those of its vertices.
+/// Farther than any path from the camera comes.
+const LIGHT_PATH: u32 = 0x0100_0000;
+const EMISSION_BLOCKS: u32 = 2;
 const CAMERA_BLOCKS: u32 = 2;
 /// Blocks that belong to no vertex; beyond those of vertices, below those of mixes inside mixes.
 const BRANCH_BLOCKS: u32 = 0x1000_0000;
@@ -165,6 +181,29 @@ impl Sampler {
         SampleStream { sampler: self, source }
     }
 
+    /// The numbers of photon `index` of a pass of a picture made of photons: of one pass stratified over the photons,
+    /// but for `independent`.
+    #[inline]
+    pub fn photon(&self, pass: u32, index: u32) -> SampleStream<'_> {
+        // Of no pixel: the last word keeps these apart from the pixels' numbers.
+        let source = match self.kind {
+            SamplerKind::Independent => {
+                Source::Independent { key: hash4(self.seed, u64::from(pass), u64::from(index), 1) }
+            }
+            SamplerKind::Stratified { .. }
+            | SamplerKind::Halton(_)
+            | SamplerKind::Sobol(_)
+            | SamplerKind::PaddedSobol(_)
+            | SamplerKind::ZSobol
+            | SamplerKind::Pmj02bn => Source::Padded {
+                index,
+                seed: hash4(self.seed, u64::from(pass), 0, 2) as u32,
+                randomization: Randomization::FastOwen,
+            },
+        };
+        SampleStream { sampler: self, source }
+    }
+
     /// Samples per pixel that the strata are laid out for.
     pub fn samples_per_pixel(&self) -> u32 {
         self.samples_per_pixel
@@ -225,6 +264,34 @@ impl SampleStream<'_> {
     #[inline]
     pub fn mix(&self, depth: u32) -> MixDraw<'_> {
         MixDraw { stream: self, block: CAMERA_BLOCKS + 2 + depth * BLOCKS_PER_VERTEX }
+    }
+
+    /// Numbers for the start of the sample's path from a light.
+    #[inline]
+    pub fn emission(&self) -> EmissionDraws {
+        let [x, y, u, v] = self.block(LIGHT_PATH);
+        let [pick, ..] = self.block(LIGHT_PATH + 1);
+        EmissionDraws { pick, position: Point2::new(x, y), direction: Point2::new(u, v) }
+    }
+
+    /// Where on the lens the vertex after `depth` scattering events of the path from a light is seen from.
+    #[inline]
+    pub fn light_path_lens(&self, depth: u32) -> Point2 {
+        let [x, y, _, _] = self.block(LIGHT_PATH + EMISSION_BLOCKS + depth * BLOCKS_PER_VERTEX);
+        Point2::new(x, y)
+    }
+
+    /// Numbers for scattering at the vertex after `depth` scattering events of the path from a light.
+    #[inline]
+    pub fn light_path_scatter(&self, depth: u32) -> ScatterDraws {
+        let [u, v, lobe, roulette] = self.block(LIGHT_PATH + EMISSION_BLOCKS + 1 + depth * BLOCKS_PER_VERTEX);
+        ScatterDraws { lobe, uv: Point2::new(u, v), roulette }
+    }
+
+    /// As [`SampleStream::mix`], for the path from a light.
+    #[inline]
+    pub fn light_path_mix(&self, depth: u32) -> MixDraw<'_> {
+        MixDraw { stream: self, block: LIGHT_PATH + EMISSION_BLOCKS + 2 + depth * BLOCKS_PER_VERTEX }
     }
 
     /// Four numbers in [0, 1), stratified together over a pixel's samples; different blocks are independent.

@@ -18,7 +18,7 @@ use irradiant_scene::desc::{
 };
 use irradiant_scene::{Assets, Diagnostic, Diagnostics, Span, Spanned};
 use irradiant_spectrum::{Basis, ColorSpace, Role, Sensor, SensorError, Spectrum};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What a caller may set over the description.
 #[derive(Clone, Copy, Debug)]
@@ -192,6 +192,7 @@ fn compile(
         truncations,
         biases,
         facts,
+        emission: OnceLock::new(),
     })
 }
 

@@ -6,10 +6,12 @@
 mod compile;
 mod facts;
 mod layers;
+mod light_paths;
 
 pub use compile::{CompileOptions, Compiled};
 pub use facts::Facts;
 pub use layers::LayerPlan;
+pub use light_paths::EmissionSampler;
 
 use crate::camera::{Camera, CameraRay, FootprintEstimator};
 use crate::film::filter::Filter;
@@ -24,6 +26,7 @@ use crate::texture::Textures;
 use irradiant_math::{Normal3, Point2, Point3, Transform, Vec3};
 use irradiant_scene::desc::FloatTextureRef;
 use irradiant_spectrum::{Basis, ColorSpace, SampledSpectrum, Sensor, Spectrum, Wavelengths};
+use std::sync::OnceLock;
 
 /// Everything that a sample is a function of, but its pixel and index and the integrator.
 pub struct Scene {
@@ -65,6 +68,7 @@ pub struct Scene {
     truncations: Vec<String>,
     biases: Vec<String>,
     facts: Facts,
+    emission: OnceLock<EmissionSampler>,
 }
 
 /// Decides alpha tests with the scene's textures.
@@ -125,6 +129,17 @@ impl Scene {
                 sensor = sensor.map(|c| c * (self.max_component / most));
             }
         }
+        self.rgb_from_sensor(sensor)
+    }
+
+    /// As [`Scene::film_rgb`], without the limit that the scene may set to a sample.
+    #[inline]
+    fn sensor_rgb(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
+        self.rgb_from_sensor(self.sensor.to_rgb(radiance, lambda))
+    }
+
+    #[inline]
+    fn rgb_from_sensor(&self, sensor: [f32; 3]) -> [f32; 3] {
         let m = &self.rgb_from_sensor;
         std::array::from_fn(|i| m[i][0] * sensor[0] + m[i][1] * sensor[1] + m[i][2] * sensor[2])
     }
@@ -159,7 +174,7 @@ impl Scene {
                 let segment = at.spawn_ray_to(p, Vec3::ZERO, Normal3::ZERO);
                 self.geometry.occluded_between(&segment, &self.alpha())
             }
-            LightTarget::Surface { p, p_error, n } => {
+            LightTarget::Surface { p, p_error, n, .. } => {
                 self.geometry.occluded_between(&at.spawn_ray_to(p, p_error, n), &self.alpha())
             }
         }
@@ -183,8 +198,12 @@ impl Scene {
             LightTarget::Infinite => (Point3::ZERO, Normal3::ZERO),
         };
         let at = TextureContext::without_footprint(p, n, alpha.uv, 0);
-        // As rays see it: what is not more than 0 is not there.
-        let value = self.alpha().alpha(alpha.texture, &at);
+        self.clamped_opacity(alpha.texture, &at)
+    }
+
+    /// As rays see it: what is not more than 0 is not there.
+    fn clamped_opacity(&self, texture: FloatTextureRef, at: &TextureContext) -> f32 {
+        let value = self.alpha().alpha(texture, at);
         if value > 0.0 { value.min(1.0) } else { 0.0 }
     }
 

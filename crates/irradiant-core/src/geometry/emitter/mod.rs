@@ -119,6 +119,11 @@ impl EmitterShape {
         }
     }
 
+    /// False for what only rays find.
+    pub fn can_be_drawn_from(&self) -> bool {
+        !matches!(self, Self::Curve(_))
+    }
+
     /// A point of the surface; `pdf` per unit area. Uniform but for curved patches and uneven scales, where it is near.
     pub fn sample_area(&self, u: Point2, wants_uv: bool) -> Option<ShapeSample> {
         let s = match self {
