@@ -597,7 +597,10 @@ fn what_is_not_rendered_is_said_once_per_kind() {
         (format!("{fog}MediumInterface \"\" \"m\" Camera \"perspective\" WorldBegin"), &["medium: vacuum"]),
         // pbrt-v4's "path" leaves media out too.
         (format!("Integrator \"path\" {fog}WorldBegin MediumInterface \"m\" \"\" Shape \"sphere\""), &[]),
-        ("Integrator \"bdpt\" WorldBegin".into(), &["integrator bdpt: path"]),
+        ("Integrator \"mlt\" WorldBegin".into(), &["integrator mlt: path"]),
+        ("Integrator \"bdpt\" WorldBegin".into(), &[]),
+        ("Integrator \"sppm\" \"float radius\" 0.1 WorldBegin".into(), &[]),
+        ("Integrator \"lightpath\" WorldBegin".into(), &[]),
         ("Integrator \"volpath\" WorldBegin".into(), &[]),
         (
             "WorldBegin Material \"hair\" Material \"hair\" Material \"subsurface\"".into(),

@@ -70,9 +70,21 @@ pub trait Integrator: Send + Sync {
     /// (scene, settings, pixel, sample index), whatever the unit that it comes in.
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats);
 
+    /// The most samples of one pixel that a work unit is to have, 1 or more. Small numbers are for estimators whose samples
+    /// of one index have something in common that takes time to make ([`crate::photon`]): all units of an index then come
+    /// one after another. Pixels do not depend on it.
+    fn samples_per_unit(&self) -> u32 {
+        64
+    }
+
     /// True when the surfaces' scattering models are evaluated, whose own limits then belong to the picture.
     fn scatters(&self) -> bool {
         true
+    }
+
+    /// Whether it can estimate this scene's picture; if not, why, and what to try. Asked before rendering.
+    fn check(&self, _scene: &Scene) -> Result<(), String> {
+        Ok(())
     }
 
     /// What makes the expected picture differ from the solution of the rendering equation; empty when unbiased.

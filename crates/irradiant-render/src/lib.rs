@@ -1,18 +1,23 @@
 //! What walks the scene: integrators, scheduling and sessions.
 //!
 //! # Layout
-//! [`integrator`] (the interface), [`path`] (the main story), its neighbours, [`lectures`] (the slides' own estimators), [`registry`]
-//! (all by name, with options), [`record`] (what a path tells of itself), then [`schedule`] and [`session`]: which work, and who does it.
+//! [`integrator`] (the interface), [`path`] (the main story), its neighbours; paths from lights ([`light_walk`]) in
+//! [`light_trace`], [`bidirectional`] and [`photon`]; [`lectures`] (the slides' own estimators), [`registry`] (all by name, with
+//! options), [`record`] (what a path tells of itself), then [`schedule`] and [`session`]: which work, and who does it.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 pub mod ambient_occlusion;
+pub mod bidirectional;
 pub mod camera_samples;
 pub mod inspect;
 pub mod integrator;
 pub mod lectures;
+pub mod light_trace;
+pub mod light_walk;
 pub mod path;
+pub mod photon;
 pub mod random_walk;
 pub mod record;
 pub mod registry;

@@ -18,15 +18,15 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Samples `first..end` of every pixel.
-    pub fn new(bounds: PixelBounds, first: u32, end: u32) -> Self {
+    /// Samples `first..end` of every pixel, at most `most` (1 or more) of one in a unit.
+    pub fn new(bounds: PixelBounds, first: u32, end: u32, most: u32) -> Self {
         let tiles = |n: usize| n.div_ceil(TILE as usize);
         let (mut passes, mut start, mut size) = (Vec::new(), first, 1);
         while start < end {
             let stop = start.saturating_add(size).min(end);
             passes.push(start..stop);
-            // 1, 1, 2, 4, ... 64: the doubling keeps the image always at a power of two until then.
-            size = if passes.len() == 1 { 1 } else { (size * 2).min(64) };
+            // 1, 1, 2, 4, ...: the doubling keeps the image always at a power of two until the most.
+            size = if passes.len() == 1 { 1 } else { (size * 2).min(most.max(1)) };
             start = stop;
         }
         Self { bounds, tiles_x: tiles(bounds.width()), tiles_y: tiles(bounds.height()), passes }
@@ -66,31 +66,34 @@ mod tests {
 
     #[test]
     fn every_sample_of_every_pixel_is_scheduled_once() {
-        let bounds = PixelBounds { x0: 3, y0: -2, x1: 40, y1: 33 };
-        let schedule = Schedule::new(bounds, 5, 105);
-        let mut seen = vec![0u32; bounds.area() * 100];
-        let mut samples = 0;
-        for i in 0..schedule.len() {
-            let unit = schedule.unit(i).unwrap();
-            assert!(unit.bounds.area() > 0);
-            for y in unit.bounds.y0..unit.bounds.y1 {
-                for x in unit.bounds.x0..unit.bounds.x1 {
-                    for s in unit.samples.clone() {
-                        let pixel = (y + 2) as usize * bounds.width() + (x - 3) as usize;
-                        seen[pixel * 100 + s as usize - 5] += 1;
-                        samples += 1;
+        for most in [64, 8, 1] {
+            let bounds = PixelBounds { x0: 3, y0: -2, x1: 40, y1: 33 };
+            let schedule = Schedule::new(bounds, 5, 105, most);
+            let mut seen = vec![0u32; bounds.area() * 100];
+            let mut samples = 0;
+            for i in 0..schedule.len() {
+                let unit = schedule.unit(i).unwrap();
+                assert!(unit.samples.len() <= most as usize);
+                assert!(unit.bounds.area() > 0);
+                for y in unit.bounds.y0..unit.bounds.y1 {
+                    for x in unit.bounds.x0..unit.bounds.x1 {
+                        for s in unit.samples.clone() {
+                            let pixel = (y + 2) as usize * bounds.width() + (x - 3) as usize;
+                            seen[pixel * 100 + s as usize - 5] += 1;
+                            samples += 1;
+                        }
                     }
                 }
             }
+            assert!(seen.iter().all(|&n| n == 1));
+            assert_eq!(samples, schedule.total_samples());
+            assert!(schedule.unit(schedule.len()).is_none());
         }
-        assert!(seen.iter().all(|&n| n == 1));
-        assert_eq!(samples, schedule.total_samples());
-        assert!(schedule.unit(schedule.len()).is_none());
     }
 
     #[test]
     fn the_first_picture_comes_early() {
-        let schedule = Schedule::new(PixelBounds { x0: 0, y0: 0, x1: 16, y1: 16 }, 0, 1000);
+        let schedule = Schedule::new(PixelBounds { x0: 0, y0: 0, x1: 16, y1: 16 }, 0, 1000, 64);
         assert_eq!(schedule.unit(0).unwrap().samples, 0..1);
         assert_eq!(schedule.unit(1).unwrap().samples, 1..2);
         assert_eq!(schedule.unit(2).unwrap().samples, 2..4);
@@ -99,7 +102,7 @@ mod tests {
     #[test]
     fn nothing_to_do_is_an_empty_schedule() {
         let bounds = PixelBounds { x0: 0, y0: 0, x1: 0, y1: 5 };
-        assert!(Schedule::new(bounds, 0, 4).is_empty() && Schedule::new(bounds, 0, 4).unit(0).is_none());
-        assert!(Schedule::new(PixelBounds { x1: 5, ..bounds }, 4, 4).is_empty());
+        assert!(Schedule::new(bounds, 0, 4, 64).is_empty() && Schedule::new(bounds, 0, 4, 64).unit(0).is_none());
+        assert!(Schedule::new(PixelBounds { x1: 5, ..bounds }, 4, 4, 64).is_empty());
     }
 }

@@ -93,7 +93,9 @@ impl Job {
             max_depth,
             session: SessionSettings { threads: settings.threads, samples_per_pixel, time_limit: settings.time_limit },
         };
-        job.header.estimate = estimate_label(job.integrator().as_ref(), &job.scene);
+        let integrator = job.integrator();
+        integrator.check(&job.scene).map_err(Error::Settings)?;
+        job.header.estimate = estimate_label(integrator.as_ref(), &job.scene);
         Ok(job)
     }
 

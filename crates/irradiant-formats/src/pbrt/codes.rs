@@ -253,7 +253,7 @@ pub const CODES: &[Code] = &[
         "W0102",
         "This integrator is not here yet; path tracing converges to the same picture, with more noise where that \
          integrator is good.",
-        "Integrator \"bdpt\"",
+        "Integrator \"mlt\"",
     ),
     code("W0103", "Subsurface scattering is rendered as a diffuse surface.", "WorldBegin Material \"subsurface\""),
     code("W0104", "Hair is rendered as a diffuse surface.", "WorldBegin Material \"hair\""),

@@ -122,12 +122,13 @@ pub(crate) fn integrator(r: &Reader, name: &Spanned<String>, p: &Params) -> (Int
             return (desc, request);
         }
         "bdpt" => {
-            stand_in = true;
+            desc.kind = IntegratorKind::Bidirectional;
             p.bool_or(r, "visualizestrategies", false);
             p.bool_or(r, "visualizeweights", false);
-            // A choice for light subpaths; `path` does as well with its own.
-            light_sampler(LightSamplerKind::Power);
-            desc.regularize = p.bool_or(r, "regularize", false);
+            // Of light samples; paths from lights choose by power.
+            desc.light_sampler = light_sampler(LightSamplerKind::Power);
+            // Nothing is blurred here, which pbrt's flag would be a bias for.
+            p.bool_or(r, "regularize", false);
             request.volumetric = true;
         }
         "mlt" => {
@@ -141,12 +142,18 @@ pub(crate) fn integrator(r: &Reader, name: &Spanned<String>, p: &Params) -> (Int
             request.volumetric = true;
         }
         "sppm" => {
-            stand_in = true;
-            p.integer(r, "photonsperiteration");
+            let paths = p.integer(r, "photonsperiteration").map_or(0, |n| n.value.max(0) as u32);
             p.integer(r, "seed");
-            p.float(r, "radius");
+            let radius = p.float_or(r, "radius", 1.0);
+            if !(radius.value > 0.0 && radius.value.is_finite()) {
+                r.push(
+                    Diagnostic::error("E0309", format!("a photon radius of {}", radius.value), radius.span)
+                        .label("expected more than 0, in scene units"),
+                );
+            }
+            desc.kind = IntegratorKind::Photon { paths_per_pass: paths, radius: radius.value };
         }
-        "lightpath" => stand_in = true,
+        "lightpath" => desc.kind = IntegratorKind::LightTrace,
         "function" => {
             let help = "use \"path\" to render the scene";
             r.error_help("E0209", "integrator \"function\" draws a formula, not the scene", name.span, help);

@@ -199,6 +199,14 @@ impl From<IntegratorKind> for IntegratorChoice {
                 choice.set("samplebsdf", Value::Flag(sample_bsdf));
                 choice
             }
+            IntegratorKind::Bidirectional => Self::of(&crate::bidirectional::ENTRY),
+            IntegratorKind::LightTrace => Self::of(&crate::light_trace::ENTRY),
+            IntegratorKind::Photon { paths_per_pass, radius } => {
+                let mut choice = Self::of(&crate::photon::ENTRY);
+                choice.set("paths", Value::Count(paths_per_pass));
+                choice.set("radius", Value::Number(radius));
+                choice
+            }
             IntegratorKind::RandomWalk => Self::of(&crate::random_walk::ENTRY),
             IntegratorKind::AmbientOcclusion { cos_sample, max_distance } => {
                 let mut choice = Self::of(&crate::ambient_occlusion::ENTRY);

@@ -16,6 +16,9 @@ use crate::integrator::Integrator;
 /// What there is, in the order of lists: production first, then the lectures in the order of their slides.
 pub const INTEGRATORS: &[IntegratorEntry] = &[
     crate::path::ENTRY,
+    crate::bidirectional::ENTRY,
+    crate::light_trace::ENTRY,
+    crate::photon::ENTRY,
     crate::simple_path::ENTRY,
     crate::random_walk::ENTRY,
     crate::ambient_occlusion::ENTRY,

@@ -86,7 +86,8 @@ impl Session {
     /// Starts rendering samples `0..samples_per_pixel` of every pixel of the scene's film.
     pub fn start(scene: Arc<Scene>, integrator: Box<dyn Integrator>, settings: &SessionSettings) -> Self {
         let film = scene.new_film();
-        let schedule = Schedule::new(film.bounds(), 0, settings.samples_per_pixel);
+        let most = integrator.samples_per_unit();
+        let schedule = Schedule::new(film.bounds(), 0, settings.samples_per_pixel, most);
         let started = Instant::now();
         let shared = Arc::new(Shared {
             scene,

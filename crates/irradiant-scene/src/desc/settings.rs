@@ -103,6 +103,17 @@ pub enum IntegratorKind {
         /// Sample the BSDF (else uniformly).
         sample_bsdf: bool,
     },
+    /// Paths from camera and lights, joined in all ways.
+    Bidirectional,
+    /// Paths from lights, seen by the camera.
+    LightTrace,
+    /// Progressive photon mapping.
+    Photon {
+        /// Paths from lights in each pass; 0: one for each pixel.
+        paths_per_pass: u32,
+        /// Radius of the first pass, scene units, finite and not negative; 0: by the size of pixels.
+        radius: f32,
+    },
     /// Uniform directions, emission only.
     RandomWalk,
     /// Fraction of the hemisphere that is open.

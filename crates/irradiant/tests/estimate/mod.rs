@@ -98,8 +98,11 @@ pub fn estimate(scene: &str, how: How) -> Estimate {
         for x in bounds.x0..bounds.x1 {
             let pixel = rendering.film.pixel(x, y);
             assert_eq!((pixel.count, pixel.square_overflow), (how.spp, 0));
-            mean.push(pixel.mean());
-            variance.push(pixel.variance().map(|v| v / f64::from(how.spp)));
+            // What paths from lights bring has its own sums.
+            let light = rendering.film.splat_estimate(x, y);
+            let (own, spread) = (pixel.mean(), pixel.variance());
+            mean.push([0, 1, 2].map(|c| own[c] + light.mean[c]));
+            variance.push([0, 1, 2].map(|c| spread[c] / f64::from(how.spp) + light.variance[c]));
         }
     }
     Estimate {
