@@ -3,6 +3,7 @@
 //! A26's note: "only one random sample over all lights". A58 loops over all N lights with M samples each; A59 picks one with
 //! probability p_i, whose weight is 1/(p_i p_L), and may average N such. A60 asks for one sample only of a light that is a point,
 //! whatever M is. Which light is picked is the option `lightsampler` ("how would you importance sample intelligently?").
+//! Another answer is [`Lights::Resampled`] (Talbot, Cline and Egbert 2005, "Importance resampling for global illumination").
 //!
 //! A27: `scene.shadowIntersection(p, wi)` has no end of the ray among its arguments. A24 and A25 then need it to mean "the first thing
 //! in that direction does not emit", A26 "something is between p and the sampled point". Both are here ([`Shadow`]), and the reading
@@ -29,6 +30,8 @@ words! {
         One = "one",
         /// Each in turn, `samples` times, points once (A58, A60).
         All = "all",
+        /// The best of `samples` candidates, each of one light picked with p_i: chosen at random by what it would bring if nothing stood in the way, with one shadow ray (A59).
+        Resampled = "resampled",
     }
 }
 
@@ -106,6 +109,7 @@ impl DirectLight {
                     }
                 }
             }
+            Lights::Resampled => sum = self.best_candidate(walk, p, first.take(), rule, &direction_pdf),
             Lights::All => {
                 for i in 0..walk.scene.lights.as_slice().len() as u32 {
                     let id = LightId(i);
@@ -132,19 +136,39 @@ impl DirectLight {
         rule: EmissionRule,
         direction_pdf: &impl Fn(Vec3) -> f32,
     ) -> SampledSpectrum {
-        let scene = walk.scene;
-        let light = scene.lights.get(light);
-        let Some(sample) = light.sample(&p.at.reference(), draws.uv, walk.lambda, rule.sample_mode()) else {
-            return SampledSpectrum::ZERO;
-        };
-        let f = p.bsdf.f(p.at.wo, sample.wi, TransportMode::Radiance) * p.bsdf.abs_cos(sample.wi);
-        let arriving = sample.radiance * scene.opacity(&sample);
-        if f.is_black() || arriving.is_black() || self.is_blocked(walk, p, &sample) {
-            return SampledSpectrum::ZERO;
+        match candidate(walk, p, light, draws, number, number, rule, direction_pdf) {
+            Some(c) if !self.is_blocked(walk, p, &c.sample) => c.brings,
+            _ => SampledSpectrum::ZERO,
         }
-        let density = number * sample.pdf;
-        let weight = if sample.is_delta { 1.0 } else { rule.light_sample_weight(density, direction_pdf(sample.wi)) };
-        f * arriving * (weight / density)
+    }
+
+    /// Resampling: of several candidates one is kept, in proportion to its brightness; it stands for the sum of all.
+    fn best_candidate(
+        &self,
+        walk: &mut Walk,
+        p: &Vertex,
+        mut first: Option<LightDraws>,
+        rule: EmissionRule,
+        direction_pdf: &impl Fn(Vec3) -> f32,
+    ) -> SampledSpectrum {
+        let mut total = 0.0;
+        let mut kept: Option<(Candidate, f32)> = None;
+        for _ in 0..self.samples {
+            let draws = first.take().unwrap_or_else(|| walk.another_light());
+            let picked = walk.scene.light_sampler.sample(&p.at.reference(), draws.pick);
+            let Some(PickedLight { id, pmf }) = picked else { continue };
+            let number = self.samples as f32 * pmf;
+            let Some(c) = candidate(walk, p, id, &draws, number, pmf, rule, direction_pdf) else { continue };
+            let brightness = c.brings.average();
+            total += brightness;
+            if draws.resample * total < brightness {
+                kept = Some((c, brightness));
+            }
+        }
+        match kept {
+            Some((c, brightness)) if !self.is_blocked(walk, p, &c.sample) => c.brings * (total / brightness),
+            _ => SampledSpectrum::ZERO,
+        }
     }
 
     /// The slides' `shadowIntersection`.
@@ -166,10 +190,12 @@ impl DirectLight {
     /// of that light has density `light_pdf`.
     pub fn density(&self, scene: &Scene, from: &ReferencePoint, light: LightId, light_pdf: f32) -> f32 {
         let chance = match self.lights {
-            Lights::One => scene.light_sampler.pmf(from, light),
-            Lights::All => 1.0,
+            Lights::One => self.samples as f32 * scene.light_sampler.pmf(from, light),
+            // The density of a candidate. That of the chosen one is not known; both techniques use the same weights, which is enough.
+            Lights::Resampled => scene.light_sampler.pmf(from, light),
+            Lights::All => self.samples as f32,
         };
-        self.samples as f32 * chance * light_pdf
+        chance * light_pdf
     }
 
     /// What the shadow test does to the picture.
@@ -182,4 +208,34 @@ impl DirectLight {
             }
         }
     }
+}
+
+/// A light sample and what it brings if nothing is in the way, all weights included; not black.
+struct Candidate {
+    sample: LightSample,
+    brings: SampledSpectrum,
+}
+
+/// Draws a point of a light, of which there are `number` on average at this vertex; `weighed` is their number for weights against
+/// directions. `None` where it brings nothing.
+fn candidate(
+    walk: &Walk,
+    p: &Vertex,
+    light: LightId,
+    draws: &LightDraws,
+    number: f32,
+    weighed: f32,
+    rule: EmissionRule,
+    direction_pdf: &impl Fn(Vec3) -> f32,
+) -> Option<Candidate> {
+    let scene = walk.scene;
+    let sample = scene.lights.get(light).sample(&p.at.reference(), draws.uv, walk.lambda, rule.sample_mode())?;
+    let f = p.bsdf.f(p.at.wo, sample.wi, TransportMode::Radiance) * p.bsdf.abs_cos(sample.wi);
+    let arriving = sample.radiance * scene.opacity(&sample);
+    let weight = match sample.is_delta {
+        true => 1.0,
+        false => rule.light_sample_weight(weighed * sample.pdf, direction_pdf(sample.wi)),
+    };
+    let brings = f * arriving * (weight / (number * sample.pdf));
+    (!brings.is_black()).then_some(Candidate { sample, brings })
 }
