@@ -4,7 +4,7 @@
 //! Lecture A is Berkeley CS184/284A "Global Illumination & Path Tracing"; lecture B is Bern "Rendering Algorithms: path tracing"
 //! (Zwicker 2014). Ids such as A54 and B38 are rows of the project's ledger, one for each claim of a slide.
 //!
-//! Three questions have several answers on the slides, and each answer is an option of its own, in a file of its own:
+//! Four questions have several answers on the slides, and each is an option of its own, in a file of its own:
 //! - where does a ray go from a surface? [`directions`] (B29; at glass B35);
 //! - does light count that a ray meets by chance? [`emission`] (B38, B32);
 //! - how are lights sampled? [`direct_light`] (A26, A58, A59; what stands in the way, A27);
