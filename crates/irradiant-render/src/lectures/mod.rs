@@ -40,7 +40,7 @@ pub(crate) const SAMPLES: OptionEntry = OptionEntry {
     name: "samples",
     range: OptionRange::Count(1, 4096),
     default: Value::Count(1),
-    doc: "light samples at a vertex: N of one light each (A59), or M of each light (A58)",
+    doc: "light samples at a vertex: N of one light each (A59), M of each light (A58), or candidates of which one is kept (resampled)",
 };
 
 /// The depth limit as a label has it, if it cuts anything off.
