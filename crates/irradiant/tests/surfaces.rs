@@ -109,7 +109,7 @@ fn specular_surfaces_have_their_closed_forms() {
     };
     let cosine = 6.428 / 6.428f64.hypot(7.660);
     let (r, how) = (fresnel(cosine, 1.5), How::new(1 << 16, 810));
-    let glass = estimate(&above("Material \"dielectric\" \"float eta\" 1.5\n"), how);
+    let glass = estimate(&above("Material \"dielectric\" \"float eta\" 1.5\n"), how.clone());
     assert_is(&glass, [r; 3], 0.12, "glass");
     // A pane reflects between its sides: r + t^2 r / (1 - r^2).
     let pane = estimate(&above("Material \"thindielectric\" \"float eta\" 1.5\n"), how);
@@ -200,7 +200,7 @@ fn a_rectangle_light_has_its_form_factor() {
     };
     for (i, shape) in ["triangles", "patch"].into_iter().enumerate() {
         let how = How::new(1 << 15, 830 + i as u64).depth(1);
-        let whole = estimate(&scene([-0.8, -1.3], [0.8, 1.3], shape), how);
+        let whole = estimate(&scene([-0.8, -1.3], [0.8, 1.3], shape), how.clone());
         assert_is(&whole, [4.0 * 4.0 * corner * 0.5; 3], 0.01, shape);
         let quarter = estimate(&scene([0.0, 0.0], [0.8, 1.3], shape), how);
         assert_is(&quarter, [4.0 * corner * 0.5; 3], 0.02, shape);
