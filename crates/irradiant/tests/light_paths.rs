@@ -71,11 +71,16 @@ fn path_and_bidirectional_agree_on_a_glass_sphere() {
     let path = estimate(&scene, How::new(4096, 21).depth(7));
     let both = estimate(&scene, How::new(768, 22).depth(7).by(by(BDPT, &[])));
     assert_agree(&both, &path, 0.06, "glass");
-    // Rough glass: everything can be joined, refraction is not symmetric.
-    let scene = scene.replace("\"dielectric\"", "\"dielectric\" \"float roughness\" 0.3");
-    let path = estimate(&scene, How::new(2048, 23).depth(5));
-    let both = estimate(&scene, How::new(512, 24).depth(5).by(by(BDPT, &[])));
-    assert_agree(&both, &path, 0.05, "rough glass");
+    // Rough glass in a room of rough metal: everything can be joined, refraction is not symmetric, and what one walk makes of
+    // a vertex depends on where it comes from.
+    let metal = "Material \"conductor\" \"float roughness\" 0.35";
+    let scene = scene
+        .replace("\"dielectric\"", "\"dielectric\" \"float roughness\" 0.3")
+        .replace("Material \"diffuse\" \"rgb reflectance\" [ 0.7 0.7 0.7 ]", metal);
+    assert!(scene.matches("conductor").count() == 2);
+    let path = estimate(&scene, How::new(4096, 23).depth(5));
+    let both = estimate(&scene, How::new(1024, 24).depth(5).by(by(BDPT, &[])));
+    assert_agree(&both, &path, 0.04, "rough glass and metal");
 }
 
 /// A floor and a ball of a coarse mesh with interpolated normals, under lights of every kind.
