@@ -105,7 +105,9 @@ def render(request):
     session.Stop()
     pixels = np.zeros(scene.width * scene.height * 3, np.float32)
     session.GetFilm().GetOutputFloat(lux.FilmOutputType.RGB, pixels, 0)
-    write_pfm(request["out"], pixels.reshape(scene.height, scene.width, 3)[::-1])
+    image = pixels.reshape(scene.height, scene.width, 3)[::-1]
+    # Its rows lie one lower than everybody's; the lowest, which it lacks then, is repeated.
+    write_pfm(request["out"], np.concatenate([image[1:], image[-1:]]))
     return {"seconds": wall * spp / taken, "cpu_seconds": cpu * spp / taken, "spp_taken": taken}
 
 

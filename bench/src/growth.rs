@@ -140,7 +140,7 @@ fn lamps(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Lamps>, Str
 
 /// Measures and prints as it goes.
 pub fn run(setting: &Setting) -> Result<Report, String> {
-    let machine = Machine::here(&setting.repository);
+    let machine = Machine::here(&setting.repository, setting.given);
     let mut missing = Vec::new();
     let sizes = sizes(setting, &mut missing)?;
     let lamps = lamps(setting, &mut missing)?;

@@ -37,8 +37,8 @@ pub fn load() -> f64 {
 }
 
 impl Machine {
-    /// This one, now; `repository` is where Irradiant's sources are.
-    pub fn here(repository: &Path) -> Self {
+    /// This one, now; `repository` is where Irradiant's sources are, `given` whether its program was built elsewhere.
+    pub fn here(repository: &Path, given: bool) -> Self {
         let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let field = |name: &str| {
             let line = cpu.lines().find(|l| l.starts_with(name)).unwrap_or_default();
@@ -58,7 +58,11 @@ impl Machine {
             system: format!("{}, {}", said("uname", &["-sr"]), name.trim_matches('"')),
             compiler: said("rustc", &["--version"]),
             date: said("date", &["-u", "+%Y-%m-%d %H:%M UTC"]),
-            commit: if changed { commit + "+" } else { commit },
+            commit: match (given, changed) {
+                (true, _) => "not known: the program was given".into(),
+                (false, true) => commit + "+",
+                (false, false) => commit,
+            },
             load: load(),
         }
     }

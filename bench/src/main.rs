@@ -25,6 +25,8 @@ pub struct Setting {
     pub repository: PathBuf,
     /// Irradiant's program.
     pub irradiant: PathBuf,
+    /// Whether it was given, and not built from these sources.
+    pub given: bool,
     /// Virtual environments of the peers.
     pub peers: Option<PathBuf>,
     /// Scenes and pictures; may be deleted.
@@ -105,13 +107,20 @@ enum What {
         /// Samples per pixel of each reference
         #[arg(long, default_value_t = 128)]
         reference_spp: u32,
+        /// The curve goes on to this number of samples per pixel
+        #[arg(long, default_value_t = 64)]
+        largest_spp: u32,
     },
     /// How cost grows with triangles and lamps
     Growth,
     /// Write the page of results from the data
     Page,
-    /// Everything, with the defaults, and the page
-    All,
+    /// Everything, and the page
+    All {
+        /// Fewer samples, seeds and rays: minutes instead of hours
+        #[arg(long)]
+        quick: bool,
+    },
 }
 
 fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), String> {
@@ -149,7 +158,17 @@ fn setting(places: &Places) -> Result<Setting, String> {
     }
     let peers = places.peers.as_deref().map(absolute).transpose()?;
     let irradiant = absolute(&irradiant)?;
-    Ok(Setting { repository, irradiant, peers, work, results, threads: places.threads, only: places.only.clone() })
+    let given = places.irradiant.is_some();
+    Ok(Setting {
+        repository,
+        irradiant,
+        given,
+        peers,
+        work,
+        results,
+        threads: places.threads,
+        only: places.only.clone(),
+    })
 }
 
 fn run(cli: &Cli) -> Result<(), String> {
@@ -170,7 +189,9 @@ fn run(cli: &Cli) -> Result<(), String> {
     let rays = |passes: usize, width: usize| {
         write_json(&setting.results.join("rays.json"), &rays::run(passes.max(1), width, &setting)?)
     };
-    let street = |spp: u32| write_json(&setting.results.join("street.json"), &street::run(spp, &setting)?);
+    let street = |spp: u32, largest: u32| {
+        write_json(&setting.results.join("street.json"), &street::run(spp, largest, &setting)?)
+    };
     let growth = || write_json(&setting.results.join("growth.json"), &growth::run(&setting)?);
     match &cli.what {
         What::Install { .. } => return Ok(()),
@@ -178,14 +199,23 @@ fn run(cli: &Cli) -> Result<(), String> {
             pictures(scenes, &pictures::Amount { spp: *spp, seeds: *seeds, reference_spp: *reference_spp })?;
         }
         What::Rays { passes, width } => rays(*passes, *width)?,
-        What::Street { reference_spp } => street(*reference_spp)?,
+        What::Street { reference_spp, largest_spp } => street(*reference_spp, *largest_spp)?,
         What::Growth => growth()?,
         What::Page => {}
-        What::All => {
+        What::All { quick } => {
             let all = scene::PICTURES.map(String::from);
-            pictures(&all, &pictures::Amount { spp: 64, seeds: 4, reference_spp: 1024 })?;
-            street(128)?;
-            rays(5, 1024)?;
+            let (spp, seeds, reference_spp) = if *quick { (16, 2, 128) } else { (64, 4, 1024) };
+            pictures(&all, &pictures::Amount { spp, seeds, reference_spp })?;
+            if *quick {
+                street(16, 16)?
+            } else {
+                street(128, 64)?
+            }
+            if *quick {
+                rays(3, 256)?
+            } else {
+                rays(5, 1024)?
+            }
             growth()?;
         }
     }

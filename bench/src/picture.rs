@@ -1,6 +1,6 @@
 //! Pictures as plain floats, and how far they are from the truth.
 
-use irradiant_image::{ReadOptions, read_file};
+use irradiant_image::{ReadOptions, ResizeFilter, ToneOptions, read_file, to_srgb8, write_jpeg};
 use std::path::Path;
 
 /// Linear RGB, rows from the top.
@@ -42,6 +42,16 @@ impl Picture {
         }
         sum.map(|s| s / mask.len() as f64)
     }
+}
+
+/// A picture of any kind at half its size, to look at: clipped, sRGB, JPEG.
+pub fn write_half_size(from: &Path, to: &Path, exposure: f32) -> Result<(), String> {
+    let image = read_file(from, &ReadOptions::default()).map_err(|e| format!("{}: {e}", from.display()))?;
+    let half =
+        image.resize(image.width() / 2, image.height() / 2, ResizeFilter::Box).ok_or("a picture without pixels")?;
+    let tone = ToneOptions { exposure, ..ToneOptions::default() };
+    let bytes = to_srgb8(&half, &tone).and_then(|p| write_jpeg(&p, 85)).map_err(|e| e.to_string())?;
+    std::fs::write(to, bytes).map_err(|e| format!("{}: {e}", to.display()))
 }
 
 /// Which pixels count.

@@ -135,7 +135,7 @@ pub fn reference(name: &str, contestant: &mut dyn Contestant, spp: u32, folder: 
 
 /// Compares on one scene and prints as it goes.
 pub fn run(scene: &Scene, amount: &Amount, setting: &Setting) -> Result<Report, String> {
-    let machine = Machine::here(&setting.repository);
+    let machine = Machine::here(&setting.repository, setting.given);
     let folder = write_scene(scene, &setting.work)?;
     println!("{}: {:?} pixels, {} triangles, {} spp", scene.name, scene.resolution, scene.triangles(), amount.spp);
     let (mut contestants, missing) = peers::all(setting, &folder);

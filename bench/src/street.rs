@@ -4,7 +4,7 @@ use crate::Setting;
 use crate::contestant::Contestant;
 use crate::machine::{Machine, load};
 use crate::peers::{self, Contestants};
-use crate::picture::{Mask, Picture, Truth};
+use crate::picture::{Mask, Picture, Truth, write_half_size};
 use crate::pictures::{reference, write_scene};
 use crate::scene;
 use serde::{Deserialize, Serialize};
@@ -61,9 +61,9 @@ fn crossing(curve: &[(f64, f64, f64)], error: f64) -> Option<(f64, f64)> {
     Some((between(pair[0].0, pair[1].0), between(pair[0].2, pair[1].2)))
 }
 
-/// Renders and prints as it goes.
-pub fn run(reference_spp: u32, setting: &Setting) -> Result<Report, String> {
-    let machine = Machine::here(&setting.repository);
+/// Renders up to so many samples per pixel (at least 16) and prints as it goes.
+pub fn run(reference_spp: u32, largest_spp: u32, setting: &Setting) -> Result<Report, String> {
+    let machine = Machine::here(&setting.repository, setting.given);
     let scene = scene::by_name("street").ok_or("no street")?;
     let folder = write_scene(&scene, &setting.work)?;
     println!("street: {} triangles, {:?} pixels", scene.triangles(), scene.resolution);
@@ -90,14 +90,17 @@ pub fn run(reference_spp: u32, setting: &Setting) -> Result<Report, String> {
     ];
     contestants.append(&mut peers);
     let mut points = Vec::new();
-    for spp in [1, 2, 4, 8, 16, 32] {
+    for spp in [1, 2, 4, 8, 16, 32, 64].into_iter().filter(|&s| s <= largest_spp.max(16)) {
         for (name, contestant) in &mut contestants {
-            if spp != 16 && name != "Irradiant rgb" && !(name == "Mitsuba llvm" && spp == 4) {
+            if spp != 16 && name != "Irradiant rgb" {
                 continue;
             }
             let out = folder.join(format!("{}-{spp}.pfm", name.replace(' ', "-")));
             let before = load();
             let cost = contestant.render(spp, 1, &out)?;
+            if name == "Irradiant rgb" && spp == 16 {
+                write_half_size(&out, &setting.results.join("street.jpg"), 1.3)?;
+            }
             let error = truth.relative_error(&Picture::read(&out)?);
             let rate = scene.pixels() as f64 * f64::from(spp) / cost.cpu_seconds / 1e6;
             println!(

@@ -50,14 +50,17 @@ struct Packet<const N: usize> {
 const _: () = assert!(std::mem::offset_of!(Packet<1>, normal) == 48 && std::mem::offset_of!(Packet<16>, normal) == 768);
 
 impl<const N: usize> Packet<N> {
-    fn of(rays: &[Ray]) -> Self {
-        let each = |f: &dyn Fn(&Ray) -> f32| std::array::from_fn(|i| f(&rays[i]));
+    #[inline(always)]
+    fn of(rays: &[Ray; N]) -> Self {
+        // Plain loops, which the compiler turns into straight code: a peer is not to pay for our filling in.
+        let axis = |pick: fn(&Ray) -> [f32; 3], a: usize| std::array::from_fn(|i| pick(&rays[i])[a]);
+        let (origin, direction) = (|r: &Ray| r.o, |r: &Ray| r.d);
         Self {
-            org: [each(&|r| r.o[0]), each(&|r| r.o[1]), each(&|r| r.o[2])],
+            org: [axis(origin, 0), axis(origin, 1), axis(origin, 2)],
             tnear: [0.0; N],
-            dir: [each(&|r| r.d[0]), each(&|r| r.d[1]), each(&|r| r.d[2])],
+            dir: [axis(direction, 0), axis(direction, 1), axis(direction, 2)],
             time: [0.0; N],
-            tfar: each(&|r| r.t_max),
+            tfar: std::array::from_fn(|i| rays[i].t_max),
             mask: [INVALID; N],
             id: [0; N],
             flags: [0; N],
@@ -294,7 +297,7 @@ impl Tree<'_> {
     pub fn closest(&self, rays: &[Ray], out: &mut [f32]) {
         let (mut a3, a4) = arguments(false);
         for (ray, out) in rays.iter().zip(out) {
-            let mut packet = Packet::<1>::of(std::slice::from_ref(ray));
+            let mut packet = Packet::<1>::of(std::array::from_ref(ray));
             // SAFETY: the scene is committed; the packet has the layout of RTCRayHit and room for the field of instance arrays.
             unsafe {
                 match self.embree.queries {
@@ -310,7 +313,7 @@ impl Tree<'_> {
     pub fn occluded(&self, rays: &[Ray], out: &mut [f32]) {
         let (mut a3, a4) = arguments(false);
         for (ray, out) in rays.iter().zip(out) {
-            let mut packet = Packet::<1>::of(std::slice::from_ref(ray));
+            let mut packet = Packet::<1>::of(std::array::from_ref(ray));
             // SAFETY: as in `closest`; a packet begins with an RTCRay.
             unsafe {
                 match self.embree.queries {
@@ -375,11 +378,12 @@ fn arguments(coherent: bool) -> (Arguments3, Arguments4) {
 }
 
 /// Sixteen rays, the last one repeated where there are fewer, and which are real.
+#[inline(always)]
 fn sixteen(rays: &[Ray]) -> Option<(Packet<16>, [c_int; 16])> {
-    let valid = std::array::from_fn(|i| if i < rays.len() { -1 } else { 0 });
-    if rays.len() == 16 {
-        return Some((Packet::of(rays), valid));
+    if let Ok(all) = rays.try_into() {
+        return Some((Packet::of(all), [-1; 16]));
     }
+    let valid = std::array::from_fn(|i| if i < rays.len() { -1 } else { 0 });
     let last = *rays.last()?;
     let filled: [Ray; 16] = std::array::from_fn(|i| *rays.get(i).unwrap_or(&last));
     Some((Packet::of(&filled), valid))

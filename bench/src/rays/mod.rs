@@ -191,27 +191,33 @@ fn on_subject(
             name.clone(),
             Box::new(|set, rays, out| if set.occlusion { tree.occluded(rays, out) } else { tree.closest(rays, out) }),
         ));
-        tracers.push((
-            format!("{name} x16"),
-            Box::new(|set, rays, out| {
-                if set.occlusion {
-                    tree.occluded16(rays, out, set.coherent);
-                } else {
-                    tree.closest16(rays, out, set.coherent);
-                }
-            }),
-        ));
+        // Embree's hint that rays are coherent may help or not: both are asked, but only where they are.
+        for hint in [false, true] {
+            tracers.push((
+                format!("{name} x16{}", if hint { " hint" } else { "" }),
+                Box::new(move |set, rays, out| {
+                    let hint = hint && set.coherent;
+                    if set.occlusion { tree.occluded16(rays, out, hint) } else { tree.closest16(rays, out, hint) }
+                }),
+            ));
+        }
     }
     for set in &sets {
         for threads in [1, 2] {
             let mut times: Vec<Vec<f64>> = tracers.iter().map(|_| Vec::new()).collect();
             let mut answers: Vec<Vec<f32>> = tracers.iter().map(|_| vec![f32::NAN; set.rays.len()]).collect();
             for _ in 0..passes {
-                for (i, (_, trace)) in tracers.iter().enumerate() {
+                for (i, (name, trace)) in tracers.iter().enumerate() {
+                    if name.ends_with("hint") && !set.coherent {
+                        continue;
+                    }
                     times[i].push(pass(trace, set, threads, &mut answers[i]));
                 }
             }
             for (i, (name, _)) in tracers.iter().enumerate() {
+                if times[i].is_empty() {
+                    continue;
+                }
                 times[i].sort_by(f64::total_cmp);
                 let rate = |seconds: f64| set.rays.len() as f64 / seconds / 1e6;
                 let different = different(&answers[0], &answers[i]);
@@ -247,7 +253,7 @@ pub fn run(passes: usize, width: usize, setting: &Setting) -> Result<Report, Str
         }
     }
     missing.iter().for_each(|m| println!("left out: {m}"));
-    let machine = Machine::here(&setting.repository);
+    let machine = Machine::here(&setting.repository, false);
     let mut report = Report { machine, passes, rates: vec![], builds: vec![], missing };
     for subject in [sets::objects(), sets::displaced(708), sets::instances()] {
         on_subject(&subject, &embrees, passes, width, &mut report)?;
