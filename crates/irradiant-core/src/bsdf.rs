@@ -2,7 +2,7 @@
 //!
 //! `f` carries no cosine. Which side a direction is on is decided by the *shading* normal alone, as in pbrt-v4.
 
-use crate::bxdf::{BsdfSample, Bxdf, Lobe, Sides, TransportMode};
+use crate::bxdf::{BsdfSample, Bxdf, Lobe, Sides, Spread, TransportMode};
 use irradiant_math::{Frame, Point2, Vec3};
 use irradiant_spectrum::SampledSpectrum;
 
@@ -61,6 +61,17 @@ impl Bsdf {
     #[inline]
     pub fn abs_cos(&self, w: Vec3) -> f32 {
         w.dot(self.frame.z).abs()
+    }
+
+    /// How far light of this pair of directions is spread, deltas left out.
+    pub fn spread(&self, wo: Vec3, wi: Vec3) -> Spread {
+        self.bxdf.spread(self.frame.to_local(wo), self.frame.to_local(wi))
+    }
+
+    /// Whether the directions lie on different sides.
+    #[inline]
+    pub fn is_transmitted(&self, wo: Vec3, wi: Vec3) -> bool {
+        wo.dot(self.frame.z) * wi.dot(self.frame.z) < 0.0
     }
 
     /// Roughens sharp lobes (biased: for path regularisation only).

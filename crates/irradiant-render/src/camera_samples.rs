@@ -65,11 +65,7 @@ pub fn for_each_sample(
                     layers.iter_mut().for_each(|value| *value *= sample.filter_weight);
                 }
                 if !tile.add(x, y, rgb, &layers) {
-                    stats.refused.push((x, y, index));
-                    if stats.refused.len() > 2 * RenderStats::MAX_REFUSED {
-                        stats.refused.sort_unstable();
-                        stats.refused.truncate(RenderStats::MAX_REFUSED);
-                    }
+                    stats.refuse(x, y, index);
                 }
             }
         }

@@ -42,6 +42,15 @@ impl RenderStats {
     pub const MAX_REFUSED: usize = 16;
     /// Rays after as many events as this are not counted by depth.
     pub const MAX_DEPTHS: usize = 64;
+
+    /// Notes a sample that the film refused, if it is among the first.
+    pub fn refuse(&mut self, x: i32, y: i32, index: u32) {
+        self.refused.push((x, y, index));
+        if self.refused.len() > 2 * Self::MAX_REFUSED {
+            self.refused.sort_unstable();
+            self.refused.truncate(Self::MAX_REFUSED);
+        }
+    }
 }
 
 impl AddAssign<&RenderStats> for RenderStats {

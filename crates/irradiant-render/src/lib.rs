@@ -3,7 +3,8 @@
 //! # Layout
 //! [`integrator`] (the interface), [`path`] (the main story), its neighbours; paths from lights ([`light_walk`]) in
 //! [`light_trace`], [`bidirectional`] and [`photon`]; [`lectures`] (the slides' own estimators), [`registry`] (all by name, with
-//! options), [`record`] (what a path tells of itself), then [`schedule`] and [`session`]: which work, and who does it.
+//! options), [`record`] (what a path tells of itself), [`expression`] and [`layered_path`] (pictures of kinds of paths, from
+//! one run), then [`schedule`] and [`session`]: which work, and who does it.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -11,9 +12,11 @@
 pub mod ambient_occlusion;
 pub mod bidirectional;
 pub mod camera_samples;
+pub mod expression;
 pub mod inspect;
 pub mod integrator;
 pub mod lectures;
+pub mod layered_path;
 pub mod light_trace;
 pub mod light_walk;
 pub mod path;

@@ -100,6 +100,14 @@ impl CoatedDiffuse {
         Self { coat: *coat, series, reflectance, filling, limits, closed }
     }
 
+    pub(super) fn coat(&self) -> &Coat {
+        &self.coat
+    }
+
+    pub(super) fn reflectance(&self) -> SampledSpectrum {
+        self.reflectance
+    }
+
     pub(super) fn flags(&self) -> Lobe {
         let mut flags = Lobe::REFLECTION;
         if self.coat.interface.is_specular() {
@@ -422,6 +430,14 @@ impl CoatedConductor {
             coat: CoatOverMirror { interface, thickness, filling, limits, weights },
             base: Conductor::new(eta / n, k / n, base),
         }
+    }
+
+    pub(super) fn coat(&self) -> &CoatOverMirror {
+        &self.coat
+    }
+
+    pub(super) fn facets(&self) -> &Ggx {
+        &self.base.facets
     }
 
     pub(super) fn flags(&self) -> Lobe {

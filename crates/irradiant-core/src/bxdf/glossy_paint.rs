@@ -29,6 +29,10 @@ impl GlossyPaint {
         Self { body: CoatedDiffuse::new(coat, reflectance, Filling::NONE, WalkLimits::UNLIMITED) }
     }
 
+    pub(super) fn body(&self) -> &CoatedDiffuse {
+        &self.body
+    }
+
     pub(super) fn flags(&self) -> Lobe {
         self.body.flags()
     }

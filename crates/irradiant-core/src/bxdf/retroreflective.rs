@@ -46,6 +46,18 @@ impl Retroreflective {
         Self { returned: retroreflectance, ground, facets, returned_probability }
     }
 
+    pub(super) fn facets(&self) -> &Ggx {
+        &self.facets
+    }
+
+    /// Whether the returned lobe scatters more than the ground does.
+    pub(super) fn returns_more(&self, wo: Vec3, wi: Vec3) -> bool {
+        let back = half_turn(wo);
+        let h = back + wi;
+        let returned = self.facets.reflection(back, wi, h / h.length());
+        self.returned.average() * returned > self.ground.average() * FRAC_1_PI
+    }
+
     pub(super) fn flags(&self) -> Lobe {
         let a = if self.returned.is_black() { Lobe::NONE } else { Lobe::GLOSSY_REFLECTION };
         let b = if self.ground.is_black() { Lobe::NONE } else { Lobe::DIFFUSE_REFLECTION };

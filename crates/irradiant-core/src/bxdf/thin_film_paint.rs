@@ -51,6 +51,14 @@ impl ThinFilmPaint {
         Self { flakes: Flakes { film, facets }, coat }
     }
 
+    pub(super) fn coat(&self) -> Option<&CoatOverMirror> {
+        self.coat.as_ref()
+    }
+
+    pub(super) fn facets(&self) -> &Ggx {
+        &self.flakes.facets
+    }
+
     pub(super) fn flags(&self) -> Lobe {
         match &self.coat {
             Some(coat) => coat.flags(self.flakes.facets.is_smooth()),

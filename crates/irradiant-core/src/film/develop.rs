@@ -68,7 +68,9 @@ impl Film {
             rest = others;
             let values = own.iter().map(|s| s.value());
             match layer {
-                Layer::Albedo | Layer::Bucket { .. } => written.extend(values.map(|v| over(v, n))),
+                Layer::Albedo | Layer::Bucket { .. } | Layer::Paths { .. } => {
+                    written.extend(values.map(|v| over(v, n)))
+                }
                 Layer::Position | Layer::Uv => written.extend(values.map(|v| over(v, hits))),
                 Layer::DepthSlope => written.extend(values.map(|v| over(v, hits).abs())),
                 Layer::Normal | Layer::ShadingNormal => {

@@ -7,9 +7,11 @@
 mod develop;
 pub mod exact;
 pub mod filter;
+mod parts;
 mod splat;
 
 pub use develop::DevelopOptions;
+pub use parts::SampleParts;
 pub use splat::SplatEstimate;
 
 use exact::{ExactSum, SquareSum};
@@ -20,7 +22,7 @@ use splat::{Splat, SplatPlane};
 /// As pbrt-v4's gbuffer film has them: reflectance is a mean over the pixel's samples; positions, slopes and texture
 /// coordinates are means over those that hit something (told by [`Layer::Hits`], without which: all of them); slopes
 /// without their sign; normals the direction of their sum. All are 0 where nothing was hit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Layer {
     /// Reflectance at the first visible surface (R, G, B).
     Albedo,
@@ -43,13 +45,20 @@ pub enum Layer {
         /// Greatest wavelength, nm.
         lambda_max: f32,
     },
+    /// Radiance carried by some of the paths (R, G, B): a mean over the pixel's samples, as the picture's own is.
+    Paths {
+        /// The channels are this and `.R`, `.G`, `.B`.
+        name: String,
+        /// Which paths, in words that determine them.
+        expression: String,
+    },
 }
 
 impl Layer {
     /// Number of channels.
     pub const fn n_channels(&self) -> usize {
         match self {
-            Self::Albedo | Self::Position | Self::Normal | Self::ShadingNormal => 3,
+            Self::Albedo | Self::Position | Self::Normal | Self::ShadingNormal | Self::Paths { .. } => 3,
             Self::DepthSlope | Self::Uv => 2,
             Self::Hits | Self::Bucket { .. } => 1,
         }
@@ -66,6 +75,7 @@ impl Layer {
             Self::ShadingNormal => names(&["Ns.X", "Ns.Y", "Ns.Z"]),
             Self::Uv => names(&["u", "v"]),
             Self::Hits => Vec::new(),
+            Self::Paths { name, .. } => ["R", "G", "B"].map(|c| format!("{name}.{c}")).to_vec(),
             Self::Bucket { lambda_min, lambda_max } => {
                 vec![format!("S0.{:.3}nm", 0.5 * (lambda_min + lambda_max)).replace('.', ",").replacen("S0,", "S0.", 1)]
             }
@@ -333,6 +343,13 @@ impl Film {
     /// Channels of all layers together.
     pub fn channels_per_pixel(&self) -> usize {
         self.tile.channels_per_pixel
+    }
+
+    /// The sums of a pixel in the layer of this index in [`Film::layers`], channel by channel.
+    pub fn layer_sums(&self, x: i32, y: i32, layer: usize) -> &[ExactSum] {
+        let first: usize = self.layers[..layer].iter().map(Layer::n_channels).sum();
+        let at = self.tile.index(x, y) * self.tile.channels_per_pixel + first;
+        &self.tile.layers[at..at + self.layers[layer].n_channels()]
     }
 
     /// A pixel's sums.

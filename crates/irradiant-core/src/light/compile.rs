@@ -7,6 +7,7 @@
 use super::area::{AreaAlpha, AreaLight, AreaRadiance};
 use super::emission::RadianceImage;
 use super::orientation::Orientation;
+use super::origin::{LightOrigin, LightOrigins};
 use super::portal::{PortalError, PortalInfiniteLight};
 use super::projection::{ProjectionLight, Screen};
 use super::{
@@ -58,14 +59,21 @@ pub(super) struct AreaEmitter {
 pub struct Lights {
     pub(super) list: Vec<Light>,
     environments: Vec<LightId>,
+    origins: LightOrigins,
 }
 
 impl Lights {
-    /// From a list; ids are indices.
+    /// From a list; ids are indices, and each light is one of the author's.
     pub fn new(list: Vec<Light>) -> Self {
+        let kinds = list.iter().map(|_| LightOrigin { kind: "light", group: None }).collect();
+        let of_light = (0..list.len() as u32).collect();
+        Self::with_origins(list, LightOrigins { list: kinds, of_light })
+    }
+
+    fn with_origins(list: Vec<Light>, origins: LightOrigins) -> Self {
         let environments =
             (0..list.len() as u32).map(LightId).filter(|id| list[id.0 as usize].is_environment()).collect();
-        Self { list, environments }
+        Self { list, environments, origins }
     }
 
     /// All lights of `desc`: those of `geometry`'s emitters first, which are told their ids, then the others in order.
@@ -107,16 +115,37 @@ impl Lights {
         for span in ignored {
             compiler.warning("W0809", "emission of a shape whose material is \"interface\" is ignored", span);
         }
+        let mut origins = LightOrigins::default();
+        let mut statement: *const AreaLightDesc = std::ptr::null();
+        for emitter in emitters.iter().flatten() {
+            // Only the order of the list shows, never an address.
+            if !std::ptr::eq(statement, Arc::as_ptr(&emitter.desc)) {
+                statement = Arc::as_ptr(&emitter.desc);
+                origins.list.push(LightOrigin { kind: "diffuse", group: emitter.desc.group.clone() });
+            }
+            origins.of_light.push(origins.list.len() as u32 - 1);
+        }
         let (mut list, ids) = compiler.area_lights(emitters);
         geometry.assign_lights(ids);
-        list.extend(desc.lights.iter().filter_map(|l| compiler.light(l)));
-        Self::new(list)
+        for light in &desc.lights {
+            if let Some(compiled) = compiler.light(light) {
+                list.push(compiled);
+                origins.of_light.push(origins.list.len() as u32);
+                origins.list.push(LightOrigin { kind: light.kind.name(), group: light.group.clone() });
+            }
+        }
+        Self::with_origins(list, origins)
     }
 
     /// The light of an id.
     #[inline]
     pub fn get(&self, id: LightId) -> &Light {
         &self.list[id.0 as usize]
+    }
+
+    /// Which of the author's lights each is part of.
+    pub fn origins(&self) -> &LightOrigins {
+        &self.origins
     }
 
     /// All of them, by id.

@@ -11,7 +11,7 @@
 //!
 //! Files, in reading order: [`point`], [`spot`], [`goniometric`], [`projection`], [`distant`], [`area`],
 //! [`environment`], [`portal`]; [`emission`] (spectra and images of radiance), [`orientation`], [`bounds`];
-//! [`compile`] (from the description).
+//! [`compile`] (from the description); [`origin`] (whose they are).
 //!
 //! Sources: Pharr, Jakob and Humphreys 2023, "Physically Based Rendering", chapter 12.
 
@@ -23,6 +23,7 @@ pub mod emission;
 pub mod environment;
 pub mod goniometric;
 pub mod orientation;
+pub mod origin;
 pub mod point;
 pub mod portal;
 pub mod projection;
@@ -41,6 +42,7 @@ pub use emission::{Emission, RadianceImage};
 pub use environment::{ImageInfiniteLight, UniformInfiniteLight};
 pub use goniometric::GoniometricLight;
 pub use orientation::Orientation;
+pub use origin::{LightOrigin, LightOrigins};
 pub use point::PointLight;
 pub use portal::PortalInfiniteLight;
 pub use projection::ProjectionLight;

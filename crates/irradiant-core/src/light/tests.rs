@@ -66,6 +66,7 @@ fn describe(kind: LightKind) -> LightDesc {
         kind,
         world_from_light: MotionDesc::still(Transform::IDENTITY),
         scale: said(1.0),
+        group: None,
         color_space: ColorSpaceName::Srgb,
         span: Span::NONE,
     }
@@ -81,6 +82,7 @@ fn area(
         radiance: radiance.map(said),
         file: image.map(file),
         scale: said(1.0),
+        group: None,
         two_sided,
         power: power.map(said),
         color_space: ColorSpaceName::Srgb,

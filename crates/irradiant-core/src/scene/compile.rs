@@ -1,6 +1,6 @@
 //! From a description to a scene: each part compiles itself; here they are put together in the one order that works.
 
-use super::{Facts, LayerPlan, Scene};
+use super::{Facts, Labels, LayerPlan, Scene};
 use crate::camera::{self, CompiledCamera};
 use crate::film::filter::Filter;
 use crate::film::{Film, PixelBounds};
@@ -174,6 +174,7 @@ fn compile(
         filter: Filter::new(&desc.filter),
         sampler: Sampler::new(desc.sampler.kind, samples_per_pixel, film.resolution.value, seed),
         layers,
+        labels: Labels::new(desc),
         samples_per_pixel,
         seed,
         basis: options.basis,

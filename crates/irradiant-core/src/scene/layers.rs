@@ -97,7 +97,13 @@ impl LayerPlan {
         &self.layers
     }
 
-    /// Number of channels.
+    /// Declares layers of radiance by kinds of paths, after all others, for an integrator that fills them itself.
+    pub fn declare_paths(&mut self, layers: impl IntoIterator<Item = Layer>) {
+        self.layers.extend(layers);
+    }
+
+    /// Number of channels that samples fill one by one: those of all layers but the declared layers of paths, which come
+    /// after them.
     pub fn channels(&self) -> usize {
         self.channels
     }

@@ -5,11 +5,13 @@
 
 mod compile;
 mod facts;
+mod labels;
 mod layers;
 mod light_paths;
 
 pub use compile::{CompileOptions, Compiled};
 pub use facts::Facts;
+pub use labels::Labels;
 pub use layers::LayerPlan;
 pub use light_paths::EmissionSampler;
 
@@ -48,6 +50,8 @@ pub struct Scene {
     pub sampler: Sampler,
     /// What the film keeps beside radiance.
     pub layers: LayerPlan,
+    /// What surfaces are called.
+    pub labels: Labels,
     /// Samples per pixel.
     pub samples_per_pixel: u32,
     /// Seed of the random numbers.
@@ -140,6 +144,27 @@ impl Scene {
 
     #[inline]
     fn rgb_from_sensor(&self, sensor: [f32; 3]) -> [f32; 3] {
+        let m = &self.rgb_from_sensor;
+        std::array::from_fn(|i| m[i][0] * sensor[0] + m[i][1] * sensor[1] + m[i][2] * sensor[2])
+    }
+
+    /// The factor that the scene's limit of the sensor's response (`maxcomponentvalue`; biased) puts on a sample of this
+    /// radiance: 1 unless there is one.
+    #[inline]
+    pub fn limit_factor(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> f32 {
+        if !self.max_component.is_finite() {
+            return 1.0;
+        }
+        let sensor = self.sensor.to_rgb(radiance, lambda);
+        let most = sensor[0].max(sensor[1]).max(sensor[2]);
+        if most > self.max_component { self.max_component / most } else { 1.0 }
+    }
+
+    /// What the sensor makes of a part of a sample's radiance, without limit: linear in `radiance`. With
+    /// [`Scene::limit_factor`] of the whole sample, parts add up to [`Scene::film_rgb`] of the whole.
+    #[inline]
+    pub fn film_rgb_of_part(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
+        let sensor = self.sensor.to_rgb(radiance, lambda);
         let m = &self.rgb_from_sensor;
         std::array::from_fn(|i| m[i][0] * sensor[0] + m[i][1] * sensor[1] + m[i][2] * sensor[2])
     }

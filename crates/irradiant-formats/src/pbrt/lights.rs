@@ -71,9 +71,15 @@ pub(crate) fn light(r: &Reader, name: &Spanned<String>, p: &Params, world_from_l
             return None;
         }
     };
+    let group = group(r, p);
     p.finish(r);
     let world_from_light = MotionDesc::still(world_from_light);
-    Some(LightDesc { kind, world_from_light, scale, color_space: p.color_space, span: p.span })
+    Some(LightDesc { kind, world_from_light, scale, group, color_space: p.color_space, span: p.span })
+}
+
+/// The light group: a parameter of our own.
+fn group(r: &Reader, p: &Params) -> Option<String> {
+    p.string(r, "group").map(|group| group.value)
 }
 
 fn infinite(r: &Reader, p: &Params) -> LightKind {
@@ -124,6 +130,7 @@ pub(crate) fn area_light(r: &Reader, name: &Spanned<String>, p: &Params) -> Opti
         radiance,
         file,
         scale: p.float_or(r, "scale", 1.0),
+        group: group(r, p),
         two_sided: p.bool_or(r, "twosided", false),
         power: target(r, p, "power"),
         color_space: p.color_space,

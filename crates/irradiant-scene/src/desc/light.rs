@@ -12,6 +12,8 @@ pub struct LightDesc {
     pub world_from_light: MotionDesc,
     /// Factor on everything.
     pub scale: Spanned<f32>,
+    /// The light group that its author put it in, for layers of the film.
+    pub group: Option<String>,
     /// The colour space of RGB values and images without one of their own.
     pub color_space: ColorSpaceName,
     /// Where it was said.
@@ -89,6 +91,20 @@ pub enum LightKind {
     },
 }
 
+impl LightKind {
+    /// Its name in scene files.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Point { .. } => "point",
+            Self::Distant { .. } => "distant",
+            Self::Spot { .. } => "spot",
+            Self::Goniometric { .. } => "goniometric",
+            Self::Projection { .. } => "projection",
+            Self::Infinite { .. } => "infinite",
+        }
+    }
+}
+
 /// The four corners of a portal, in world space: the current transform is not applied, as in pbrt-v4.
 pub type PortalDesc = [[f32; 3]; 4];
 
@@ -101,6 +117,8 @@ pub struct AreaLightDesc {
     pub file: Option<Spanned<FileDesc>>,
     /// Factor on everything.
     pub scale: Spanned<f32>,
+    /// The light group that its author put it in, for layers of the film.
+    pub group: Option<String>,
     /// Emits on both sides.
     pub two_sided: bool,
     /// Total power asked for.

@@ -35,6 +35,7 @@ pub(super) fn emissive(mut s: ShapeDesc) -> ShapeDesc {
         radiance: None,
         file: None,
         scale: Spanned::unplaced(1.0),
+        group: None,
         two_sided: true,
         power: None,
         color_space: ColorSpaceName::Srgb,
