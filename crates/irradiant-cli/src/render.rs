@@ -7,7 +7,7 @@ use crate::say::say;
 use crate::stats::Clock;
 use clap::Args;
 use irradiant::image::FileFormat;
-use irradiant::{Error, Job, MaxDepth, Rendering, SceneFile};
+use irradiant::{Aov, Error, Job, MaxDepth, Rendering, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -33,6 +33,13 @@ pub struct RenderArguments {
     /// Brighten display pictures (.png, .qoi, .jpg) by this many stops; .exr, .pfm and .hdr stay as they are
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
+    /// Layers by kinds of paths, in the .exr: NAME=EXPRESSION (as in caustics=LS+DE), bounces:N, partial:N, lights, groups,
+    /// techniques or gi; may be given several times
+    #[arg(long, value_name = "LAYERS")]
+    aov: Vec<Aov>,
+    /// Write the picture and its layers, small and labelled, on one sheet
+    #[arg(long, value_name = "FILE.png")]
+    contact_sheet: Option<PathBuf>,
     /// A quick look: a quarter of the pixels, at most 16 samples each
     #[arg(long)]
     preview: bool,
@@ -63,6 +70,7 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     let mut settings = arguments.picture.settings();
     settings.threads = arguments.threads.unwrap_or(0) as usize;
     settings.time_limit = arguments.time;
+    settings.aovs = arguments.aov.clone();
     if arguments.preview {
         let full = settings.resolution.unwrap_or(file.desc.film.resolution.value);
         settings.resolution = Some(full.map(|n| (n / 2).max(1)));
@@ -100,6 +108,12 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
             }
         }
     }
+    if let Some(path) = &arguments.contact_sheet
+        && let Err(why) = rendering.save_contact_sheet(path, arguments.exposure)
+    {
+        say!("{why}");
+        failed.get_or_insert(why);
+    }
     if let Some(why) = failed {
         return Err(why);
     }
@@ -125,6 +139,7 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
         say!("stopped early: {least} to {most} of {} samples per pixel", rendering.header.samples_per_pixel);
     }
     if !arguments.quiet {
+        report_layers(&rendering);
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         let (seconds, cpu) = clock.total();
         say!(
@@ -205,8 +220,13 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
         arguments.output.clone()
     };
     // Tell now, not after hours of rendering.
-    for path in paths.iter().chain(&arguments.stats) {
+    for path in paths.iter().chain(&arguments.stats).chain(&arguments.contact_sheet) {
         check_folder(path)?;
+    }
+    if let Some(path) = &arguments.contact_sheet
+        && FileFormat::from_name(&path.to_string_lossy()) != Some(FileFormat::Png)
+    {
+        return Err(Error::Settings(format!("--contact-sheet {}: sheets are .png", path.display())));
     }
     for path in &paths {
         let known = FileFormat::from_name(&path.to_string_lossy());
@@ -240,6 +260,30 @@ fn check_folder(path: &Path) -> Result<(), Error> {
             let why = irradiant::image::ImageError::Io { path: folder.to_owned(), error };
             Err(Error::Output { path: path.to_owned(), why })
         }
+    }
+}
+
+/// How much of the picture's light each layer shows; terms K^i with their ratio to the one before.
+fn report_layers(rendering: &Rendering) {
+    let layers = rendering.layer_light();
+    let widest = layers.iter().map(|l| l.name.len()).max().unwrap_or(0);
+    let mut before: Option<(u32, f64)> = None;
+    for layer in &layers {
+        let bounces = layer.name.strip_prefix('K').and_then(|n| n.parse::<u32>().ok());
+        let ratio = match (before, bounces) {
+            (Some((i, share)), Some(j)) if j == i + 1 && share > 0.0 => format!("   x {:.3}", layer.share / share),
+            _ => String::new(),
+        };
+        say!("  {:widest$} {:9.4} %  {}{ratio}", layer.name, 100.0 * layer.share, layer.expression);
+        before = bounces.map(|i| (i, layer.share));
+    }
+    if let Some(t) = rendering.truncation() {
+        say!(
+            "maxdepth {} leaves out light: about {:.2} % of the picture's, if its terms go on to fall by {:.3} each",
+            t.max_depth,
+            100.0 * t.missing,
+            t.ratio
+        );
     }
 }
 

@@ -193,6 +193,10 @@ impl Image {
         self.channels.len()
     }
 
+    pub(crate) fn pixels_mut(&mut self) -> &mut Pixels {
+        &mut self.pixels
+    }
+
     /// The samples as they are stored.
     #[inline]
     pub fn pixels(&self) -> &Pixels {

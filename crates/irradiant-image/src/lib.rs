@@ -27,6 +27,7 @@
 //! - [`metrics`]: MSE, relMSE, MAPE, PSNR, worst tile.
 //! - [`flip`]: the FLIP difference, for displays and for high dynamic range.
 //! - [`tone`]: exposure, filmic curves, sRGB bytes, false colour.
+//! - [`lettering`]: plain letters on pictures.
 #![forbid(unsafe_code)]
 
 pub mod atomic;
@@ -35,6 +36,7 @@ pub mod error;
 pub mod flip;
 pub mod format;
 pub mod image;
+pub mod lettering;
 pub mod metadata;
 pub mod metrics;
 pub mod mip;

@@ -25,6 +25,8 @@ pub struct Header {
     pub not_honoured: Vec<String>,
     /// Samples that were not finite or out of range, and are left out of the means.
     pub samples_refused: u64,
+    /// Layers of paths, each as "name = expression".
+    pub layers: Vec<String>,
     /// World to camera at shutter opening, row-major, row vectors (OpenEXR's convention).
     pub world_to_camera: [f32; 16],
 }
@@ -47,6 +49,9 @@ impl Header {
         text("irradiant/samples_refused", self.samples_refused.to_string());
         if !self.not_honoured.is_empty() {
             text("irradiant/not_honoured", self.not_honoured.join("; "));
+        }
+        if !self.layers.is_empty() {
+            metadata.set_attribute("irradiant/layers", Attribute::Text(self.layers.join("; ")));
         }
         metadata.set_attribute("samplesPerPixel", Attribute::Int(self.samples_per_pixel.min(i32::MAX as u32) as i32));
         metadata.set_attribute("worldToCamera", Attribute::Matrix4(self.world_to_camera));

@@ -14,19 +14,25 @@
 //! ```
 //!
 //! # Layout
-//! [`load`](fn@load) and [`SceneFile`]; [`RenderSettings`]; [`render`](fn@render), [`Job`] and [`Rendering`]; [`Error`].
+//! [`load`](fn@load) and [`SceneFile`]; [`RenderSettings`] and [`Aov`]; [`render`](fn@render), [`Job`] and [`Rendering`];
+//! [`Error`].
 //! The crates below are re-exported under their last names ([`core`], [`image`], ...).
 #![forbid(unsafe_code)]
 
+mod aov;
+mod contact_sheet;
 pub mod drawing;
 mod error;
 mod header;
+mod layers;
 mod load;
 mod render;
 mod settings;
 
+pub use aov::Aov;
 pub use error::{Error, Report};
 pub use header::Header;
+pub use layers::{LayerLight, Truncation};
 pub use load::{SceneFile, cornell_box, load, load_text};
 pub use render::{Job, Rendering, render};
 pub use settings::{ColorMode, MaxDepth, RenderSettings};

@@ -1,5 +1,6 @@
 //! From a description to a picture.
 
+use crate::aov;
 use crate::error::{Error, Report};
 use crate::header::Header;
 use crate::load::SceneFile;
@@ -7,11 +8,12 @@ use crate::settings::{ColorMode, MaxDepth, RenderSettings};
 use irradiant_core::film::{DevelopOptions, Film};
 use irradiant_core::scene::{CompileOptions, Scene};
 use irradiant_image::{FileFormat, Image, ToneOptions, atomic_write};
+use irradiant_render::layered_path::{LayeredPath, PathLayer, PathLayers};
 use irradiant_render::path::PathIntegrator;
 use irradiant_render::registry::IntegratorChoice;
 use irradiant_render::session::Finished;
 use irradiant_render::{Integrator, Limit, RenderStats, Session, SessionSettings};
-use irradiant_spectrum::Basis;
+use irradiant_spectrum::{Basis, ColorSpace};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -25,6 +27,7 @@ pub struct Job {
     pub report: Report,
     integrator: IntegratorChoice,
     max_depth: Option<u32>,
+    layers: Option<Arc<PathLayers>>,
     session: SessionSettings,
 }
 
@@ -65,10 +68,18 @@ impl Job {
         if settings.strict {
             report.diagnostics.promote_not_honoured();
         }
-        let scene = match compiled.scene {
-            Some(scene) if !report.diagnostics.has_errors() => Arc::new(scene),
+        let mut scene = match compiled.scene {
+            Some(scene) if !report.diagnostics.has_errors() => scene,
             _ => return Err(Error::Scene(Box::new(report))),
         };
+        if !settings.aovs.is_empty() && integrator.name() != "path" {
+            return Err(Error::Settings(format!(
+                "--aov takes the paths of the integrator \"path\" apart, not those of \"{}\"; add --integrator path",
+                integrator.name()
+            )));
+        }
+        let layers = aov::declare(&settings.aovs, &mut scene)?.map(Arc::new);
+        let scene = Arc::new(scene);
         let samples_per_pixel = scene.samples_per_pixel;
         let mut job = Self {
             header: Header {
@@ -85,12 +96,14 @@ impl Job {
                 estimate: String::new(),
                 not_honoured: report.diagnostics.not_honoured().map(String::from).collect(),
                 samples_refused: 0,
+                layers: layers.iter().flat_map(|l| l.as_slice()).map(describe).collect(),
                 world_to_camera: scene.world_to_camera(),
             },
             scene,
             report,
             integrator,
             max_depth,
+            layers,
             session: SessionSettings { threads: settings.threads, samples_per_pixel, time_limit: settings.time_limit },
         };
         let integrator = job.integrator();
@@ -101,7 +114,10 @@ impl Job {
 
     /// The integrator, with its limits.
     pub fn integrator(&self) -> Box<dyn Integrator> {
-        self.integrator.integrator(self.max_depth)
+        match (&self.layers, self.path_integrator()) {
+            (Some(layers), Some(path)) => Box::new(LayeredPath { path, layers: Arc::clone(layers) }),
+            _ => self.integrator.integrator(self.max_depth),
+        }
     }
 
     /// Which integrator, with what options.
@@ -131,7 +147,14 @@ impl Job {
         if (totals.min_count, totals.max_count) != (wanted, wanted) {
             header.samples_taken = Some([totals.min_count, totals.max_count]);
         }
-        Rendering { film, stats, header, variance: self.scene.layers.variance }
+        Rendering {
+            film,
+            stats,
+            header,
+            variance: self.scene.layers.variance,
+            color_space: self.scene.color_space(),
+            max_depth: self.max_depth,
+        }
     }
 }
 
@@ -144,6 +167,8 @@ pub struct Rendering {
     /// What determines the pixels.
     pub header: Header,
     variance: bool,
+    pub(crate) color_space: &'static ColorSpace,
+    pub(crate) max_depth: Option<u32>,
 }
 
 impl Rendering {
@@ -193,6 +218,11 @@ pub fn render(file: &SceneFile, settings: &RenderSettings) -> Result<Rendering, 
         return Err(Error::Internal("a render thread stopped; please report the scene".into()));
     }
     Ok(job.rendering(film, stats))
+}
+
+/// A layer in words that determine its pixels.
+fn describe(layer: &PathLayer) -> String {
+    format!("{} = {}", layer.name, layer.expression.text())
 }
 
 /// "unbiased", or why not: what is left out, what is biased, what else is estimated.

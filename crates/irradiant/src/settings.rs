@@ -1,5 +1,6 @@
 //! What a user may set over what the scene says.
 
+use crate::aov::Aov;
 use irradiant_render::registry::IntegratorChoice;
 use std::time::Duration;
 
@@ -43,6 +44,8 @@ pub struct RenderSettings {
     /// Options of the integrator (the scene's, if no other is given), each as `key=value`; what
     /// [`IntegratorChoice::with_words`] takes.
     pub estimator: Vec<String>,
+    /// Layers by kinds of paths, for the integrator `path`.
+    pub aovs: Vec<Aov>,
     /// Depth limit.
     pub max_depth: Option<MaxDepth>,
     /// Basis of colour.
