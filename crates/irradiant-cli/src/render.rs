@@ -140,6 +140,7 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     }
     if !arguments.quiet {
         report_layers(&rendering);
+        report_missing_light(&job, &rendering);
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         let (seconds, cpu) = clock.total();
         say!(
@@ -283,6 +284,20 @@ fn report_layers(rendering: &Rendering) {
             t.max_depth,
             100.0 * t.missing,
             t.ratio
+        );
+    }
+}
+
+/// What a depth limit leaves out, unless the layers have told.
+fn report_missing_light(job: &Job, rendering: &Rendering) {
+    if rendering.truncation().is_none()
+        && let Some(max_depth) = job.max_depth()
+        && let Some(missing) = job.missing_light()
+    {
+        say!(
+            "maxdepth {max_depth} leaves out light: {:.2} % of the picture's, +- {:.2}, by a few paths without limit",
+            100.0 * missing.share,
+            100.0 * missing.standard_error
         );
     }
 }

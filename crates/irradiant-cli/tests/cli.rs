@@ -350,3 +350,41 @@ fn versions_and_help_are_there() {
         assert!(help.contains(flag), "{flag} is not documented");
     }
 }
+
+#[test]
+fn layers_are_written_beside_the_picture_and_told_of() {
+    let folder = Folder::new("layers");
+    let aov = ["--aov", "bounces:2", "--aov", "red=L.*D'red'.*E", "--max-depth", "2", "--contact-sheet", "sheet.png"];
+    let output = folder.run(&[&["render", "-o", "box.exr"], &SMALL[..], &aov].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert_eq!(folder.names(), ["box.exr", "sheet.png"]);
+    for told in ["K2", "Krest", "L.*D'red'.*E", "maxdepth 2 leaves out light: about"] {
+        assert!(stderr(&output).contains(told), "{told}: {}", stderr(&output));
+    }
+    let file = std::fs::read(folder.0.join("box.exr")).expect("readable");
+    let image = irradiant::image::read(&file, "box.exr", &irradiant::image::ReadOptions::default()).expect("an EXR");
+    for channel in ["R", "K0.R", "K2.B", "Krest.G", "red.R"] {
+        assert!(image.channel_index(channel).is_some(), "{channel}: {:?}", image.channels());
+    }
+    let sheet = std::fs::read(folder.0.join("sheet.png")).expect("readable");
+    assert!(irradiant::image::read(&sheet, "sheet.png", &irradiant::image::ReadOptions::default()).is_ok());
+}
+
+#[test]
+fn mistakes_in_expressions_are_shown_in_their_place() {
+    let folder = Folder::new("expressions");
+    let cases: [(&[&str], &str); 6] = [
+        (&["--aov", "a=LXDE"], "LXDE\n   ^"),
+        (&["--aov", "a=LD'rde'E"], "did you mean 'red'?"),
+        (&["--aov", "bouces:3"], "did you mean \"bounces\"?"),
+        (&["--aov", "groups"], "string group"),
+        (&["--aov", "gi", "--integrator", "randomwalk"], "--integrator path"),
+        (&["--contact-sheet", "sheet.jpg"], "sheets are .png"),
+    ];
+    for (flags, told) in cases {
+        let output = folder.run(&[&["render"], &SMALL[..], flags].concat());
+        assert_eq!(code(&output), 2, "{flags:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(told), "{flags:?}: {}", stderr(&output));
+    }
+    assert!(folder.names().is_empty());
+}

@@ -27,6 +27,7 @@ pub mod registry;
 pub mod schedule;
 pub mod session;
 pub mod simple_path;
+pub mod truncation;
 
 pub use integrator::{Integrator, Limit, RenderStats, WorkUnit};
 pub use session::{Progress, Session, SessionSettings};

@@ -89,10 +89,11 @@ impl Rendering {
         for (i, (label, _)) in labels.iter().enumerate() {
             let [left, top] = grid.at(i);
             let mut label = label.clone();
-            while text_width(&label, grid.dot) > grid.tile[0] {
+            let dot = if text_width(&label, grid.dot) > grid.tile[0] { 1 } else { grid.dot };
+            while text_width(&label, dot) > grid.tile[0] {
                 label.pop();
             }
-            write_text(&mut sheet, [left, top + grid.tile[1] + GUTTER], grid.dot, &label, INK);
+            write_text(&mut sheet, [left, top + grid.tile[1] + GUTTER], dot, &label, INK);
         }
         Ok(sheet)
     }

@@ -12,6 +12,7 @@ use irradiant_render::layered_path::{LayeredPath, PathLayer, PathLayers};
 use irradiant_render::path::PathIntegrator;
 use irradiant_render::registry::IntegratorChoice;
 use irradiant_render::session::Finished;
+use irradiant_render::truncation::{MissingLight, missing_light};
 use irradiant_render::{Integrator, Limit, RenderStats, Session, SessionSettings};
 use irradiant_spectrum::{Basis, ColorSpace};
 use std::path::Path;
@@ -131,6 +132,19 @@ impl Job {
             max_depth: self.max_depth,
             regularize: self.integrator.options().flag("regularize"),
         })
+    }
+
+    /// Scattering events at most.
+    pub fn max_depth(&self) -> Option<u32> {
+        self.max_depth
+    }
+
+    /// What the depth limit leaves out, estimated from a few paths without limit (a sixteenth of the picture's, 16384 at most);
+    /// `None` without a limit, and of other integrators than `path`.
+    pub fn missing_light(&self) -> Option<MissingLight> {
+        let samples = self.scene.bounds().area() as u64 * u64::from(self.scene.samples_per_pixel);
+        let paths = (samples / 16).clamp(256, 16384) as u32;
+        missing_light(&self.scene, &self.path_integrator()?, paths)
     }
 
     /// Starts rendering.
