@@ -18,7 +18,7 @@ use crate::geometry::{Alpha, EmitterShape, Geometry};
 use crate::interaction::LightId;
 use irradiant_image::Image;
 use irradiant_math::elementary::cos;
-use irradiant_math::{Bounds3, Point3, Transform, Vec3, warp};
+use irradiant_math::{Bounds3, Point2, Point3, Transform, Vec3, warp};
 use irradiant_scene::SceneDesc;
 use irradiant_scene::desc::texture::BasicTexture;
 use irradiant_scene::desc::{
@@ -167,6 +167,19 @@ impl Lights {
     #[inline]
     pub fn environments(&self) -> &[LightId] {
         &self.environments
+    }
+
+    /// Where the one environment's image will be seen by a ray in this direction, should it leave the scene: asked
+    /// before the ray is traced, so that the memory is there afterwards. `None` when there is no such image.
+    #[inline]
+    pub fn place_of_escape(&self, direction: Vec3) -> Option<Point2> {
+        match self.environments[..] {
+            [only] => match &self.list[only.0 as usize] {
+                Light::ImageInfinite(light) => Some(light.place(direction)),
+                _ => None,
+            },
+            _ => None,
+        }
     }
 }
 

@@ -212,13 +212,28 @@ impl RadianceImage {
         }
     }
 
-    /// The pixel at (u, v); outside of the unit square the nearest one.
     #[inline]
-    pub fn nearest(&self, uv: Point2) -> [f32; 3] {
+    fn nearest_index(&self, uv: Point2) -> usize {
         // The saturating casts send negatives and NaN to 0.
         let x = ((uv.x * self.width as f32) as usize).min(self.width - 1);
         let y = ((uv.y * self.height as f32) as usize).min(self.height - 1);
-        self.pixel(x, y)
+        y * self.width + x
+    }
+
+    /// The pixel at (u, v); outside of the unit square the nearest one.
+    #[inline]
+    pub fn nearest(&self, uv: Point2) -> [f32; 3] {
+        self.pixels.at(self.nearest_index(uv))
+    }
+
+    /// Asks for the memory of [`RadianceImage::nearest`].
+    #[inline]
+    pub(crate) fn prefetch(&self, uv: Point2) {
+        let i = self.nearest_index(uv);
+        match &self.pixels {
+            Pixels::Half(pixels) => irradiant_bvh::prefetch_read(&pixels[i]),
+            Pixels::Single(pixels) => irradiant_bvh::prefetch_read(&pixels[i]),
+        }
     }
 
     /// Bilinear between pixel centres, the border repeated outwards.

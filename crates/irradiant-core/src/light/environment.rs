@@ -138,19 +138,43 @@ impl ImageInfiniteLight {
         })
     }
 
+    /// The point of the image that a ray in this direction sees, whose memory is asked for: looking up a sky is waiting.
+    #[inline]
+    pub fn place(&self, direction: Vec3) -> Point2 {
+        let uv = warp::equal_area_sphere_to_square(self.orientation.to_light(direction));
+        self.image.prefetch(uv);
+        uv
+    }
+
+    #[inline]
+    fn pdf_of(&self, rgb: [f32; 3], wi: Vec3, mode: SampleMode) -> f32 {
+        let stretch = self.orientation.stretch(self.orientation.to_light(wi));
+        self.density(mode).pdf(rgb) / (4.0 * PI * stretch)
+    }
+
     /// See [`super::Light::pdf_escaped`].
     #[inline]
     pub fn pdf(&self, wi: Vec3, mode: SampleMode) -> f32 {
-        let w = self.orientation.to_light(wi);
-        let uv = warp::equal_area_sphere_to_square(w);
-        self.density(mode).pdf(self.image.nearest(uv)) / (4.0 * PI * self.orientation.stretch(w))
+        self.pdf_of(self.image.nearest(self.place(wi)), wi, mode)
     }
 
     /// See [`super::Light::escaped`].
     #[inline]
     pub fn escaped(&self, direction: Vec3, lambda: &Wavelengths) -> SampledSpectrum {
-        let uv = warp::equal_area_sphere_to_square(self.orientation.to_light(direction));
-        self.radiance(self.image.nearest(uv), lambda)
+        self.radiance(self.image.nearest(self.place(direction)), lambda)
+    }
+
+    /// See [`super::Light::escaped_and_pdf`].
+    #[inline]
+    pub fn escaped_and_pdf(
+        &self,
+        direction: Vec3,
+        place: Option<Point2>,
+        lambda: &Wavelengths,
+        mode: SampleMode,
+    ) -> (SampledSpectrum, f32) {
+        let rgb = self.image.nearest(place.unwrap_or_else(|| self.place(direction)));
+        (self.radiance(rgb, lambda), self.pdf_of(rgb, direction, mode))
     }
 
     /// See [`super::Light::power`]; of the mean colour, which is the mean power but for the bend of uplifting.

@@ -314,6 +314,24 @@ impl Light {
         }
     }
 
+    /// [`Light::escaped`], and [`Light::pdf_escaped`] as seen from `at` (0 without), at once. `place` is where the light's
+    /// image is seen, if [`Lights::place_of_escape`] has found it already.
+    #[inline]
+    pub fn escaped_and_pdf(
+        &self,
+        ray: &Ray,
+        place: Option<Point2>,
+        at: Option<&ReferencePoint>,
+        lambda: &Wavelengths,
+        mode: SampleMode,
+    ) -> (SampledSpectrum, f32) {
+        if let Self::ImageInfinite(l) = self {
+            let (radiance, pdf) = l.escaped_and_pdf(ray.d, place, lambda, mode);
+            return (radiance, if at.is_some() { pdf } else { 0.0 });
+        }
+        (self.escaped(ray, lambda), at.map_or(0.0, |at| self.pdf_escaped(at, ray.d, mode)))
+    }
+
     /// Emitted power per nanometre; of lights at infinity what crosses the scene's disk.
     pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
         match self {
