@@ -149,7 +149,7 @@ impl BidirectionalIntegrator {
         camera_densities(&walks.camera[..k], densities);
         if let Some(next) = k.checked_sub(1).map(|k| &walks.camera[k]) {
             // What the light would do; the vertex after is as the walk left it.
-            densities.vertices[1].from_light = self.from_end(scene, end, next.at.p, next.at.n);
+            densities.vertices[1].from_light = self.found_by_light(scene, end, next.at.p, next.at.n);
             densities.vertices[1].connectible = !next.delta;
         }
         self.finished(0, densities)
@@ -211,7 +211,7 @@ impl BidirectionalIntegrator {
             first.from_camera = end.by_walk;
             densities.vertices.push(first);
             camera_densities(&walks.camera[..k + 1], densities);
-            densities.vertices[1].from_light = self.from_end(scene, &end, at.p, at.n);
+            densities.vertices[1].from_light = self.found_by_light(scene, &end, at.p, at.n);
             densities.vertices[1].connectible = true;
             self.reach_back(walks, k, 2, s.wi, densities);
             self.finished(1, densities)
@@ -336,7 +336,7 @@ impl BidirectionalIntegrator {
     }
 
     /// Density per area with which the light's walk finds `p` next.
-    fn from_end(&self, scene: &Scene, end: &End, p: Point3, n: Normal3) -> f32 {
+    fn found_by_light(&self, scene: &Scene, end: &End, p: Point3, n: Normal3) -> f32 {
         let light = scene.lights.get(end.light);
         let (position, direction) = light.pdf_emit(&end.hit, -end.to_light);
         if end.infinite {

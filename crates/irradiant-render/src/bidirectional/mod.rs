@@ -47,7 +47,7 @@ pub struct Shown {
 }
 
 /// What can be set.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BidirectionalIntegrator {
     /// Scattering events at most; `None`: no limit.
     pub max_depth: Option<u32>,

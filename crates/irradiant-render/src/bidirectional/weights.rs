@@ -18,12 +18,6 @@ words! {
     }
 }
 
-impl Default for Heuristic {
-    fn default() -> Self {
-        Self::Power
-    }
-}
-
 /// One vertex in the eyes of both walks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Density {
