@@ -31,6 +31,12 @@ pub(crate) trait Lanes:
     fn mask(self) -> u32;
 }
 
+/// Eight lanes.
+pub(crate) trait Eight: Lanes<Array = [f32; 8]> {
+    /// Three permutations: lane `i` becomes the lane that the lowest three of the four bits at `4 i` name.
+    fn choose<const N: usize>(lanes: [Self; 3], words: [u32; N]) -> [[Self; 3]; N];
+}
+
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Portable([f32; 4]);
@@ -171,6 +177,14 @@ impl<F: Lanes<Array = [f32; 4]>> Lanes for Twice<F> {
     #[inline(always)]
     fn mask(self) -> u32 {
         self.0.mask() | self.1.mask() << 4
+    }
+}
+
+impl<F: Lanes<Array = [f32; 4]>> Eight for Twice<F> {
+    #[inline(always)]
+    fn choose<const N: usize>(lanes: [Self; 3], words: [u32; N]) -> [[Self; 3]; N] {
+        let from = lanes.map(Self::to_array);
+        words.map(|word| from.map(|axis| Self::load(&std::array::from_fn(|i| axis[(word >> (4 * i)) as usize & 7]))))
     }
 }
 
@@ -347,6 +361,25 @@ mod avx {
             avx!(_mm256_movemask_ps(self.0)) as u32
         }
     }
+
+    impl Eight for Avx {
+        #[inline(always)]
+        fn choose<const N: usize>([x, y, z]: [Self; 3], words: [u32; N]) -> [[Self; 3]; N] {
+            let mut out = [[x; 3]; N];
+            for n in 0..N {
+                let which = avx!(_mm256_srlv_epi32(
+                    _mm256_set1_epi32(words[n] as i32),
+                    _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28)
+                ));
+                out[n] = [
+                    Self(avx!(_mm256_permutevar8x32_ps(x.0, which))),
+                    Self(avx!(_mm256_permutevar8x32_ps(y.0, which))),
+                    Self(avx!(_mm256_permutevar8x32_ps(z.0, which))),
+                ];
+            }
+            out
+        }
+    }
 }
 
 #[cfg(all(test, target_arch = "x86_64"))]
@@ -373,8 +406,17 @@ mod tests {
     fn avx_lanes_agree_with_portable_ones() {
         #[target_feature(enable = "avx2")]
         fn compiled(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
-            run::<Avx>(x, y)
+            let lanes = [Avx::load(&x), Avx::load(&y), Avx::splat(1.0)];
+            let chosen = Avx::choose(lanes, WORDS).as_flattened().iter().map(|l| l.to_array()).collect::<Vec<_>>();
+            [run::<Avx>(x, y), chosen].concat()
         }
+        fn portable(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
+            type P = Twice<Portable>;
+            let lanes = [P::load(&x), P::load(&y), P::splat(1.0)];
+            let chosen = P::choose(lanes, WORDS).as_flattened().iter().map(|l| l.to_array()).collect::<Vec<_>>();
+            [run::<P>(x, y), chosen].concat()
+        }
+        const WORDS: [u32; 3] = [0x7654_3210, 0x0123_4567, 0xf8f9_1122];
         if !is_x86_feature_detected!("avx2") {
             return;
         }
@@ -382,7 +424,7 @@ mod tests {
             for &b in &VALUES {
                 let (x, y) = ([a, b, b, a, 1.0, b, VALUES[(i + 1) % 12], -a], [b, a, a, 1.0, b, -b, 0.5, b]);
                 // SAFETY: the machine has AVX2.
-                same(&run::<Twice<Portable>>(x, y), &unsafe { compiled(x, y) });
+                same(&portable(x, y), &unsafe { compiled(x, y) });
             }
         }
     }

@@ -13,7 +13,7 @@ pub enum Level {
     Neon,
     /// The x86-64 baseline (SSE2).
     Sse,
-    /// AVX2 with BMI and LZCNT.
+    /// AVX2 with FMA, BMI and LZCNT.
     Avx2,
     /// AVX-512 F and VL on 256-bit vectors.
     Avx512,
@@ -39,6 +39,7 @@ impl Level {
     #[cfg(target_arch = "x86_64")]
     fn best() -> Self {
         let avx2 = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")

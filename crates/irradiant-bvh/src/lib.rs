@@ -1,22 +1,22 @@
 //! Bounding volume hierarchies: what a ray meets first, and whether it meets anything.
 //!
-//! One structure, [`Bvh`], holds two kinds of primitive in one tree: **triangles**, copied into blocks of four and
-//! tested here with a watertight test, and **user primitives**, known only by their boxes and tested by the caller
+//! One structure, [`Bvh`], holds two kinds of primitive in one tree: **triangles**, copied into blocks that share vertices
+//! and tested here with a watertight test, and **user primitives**, known only by their boxes and tested by the caller
 //! through [`Leaves`]. Curves, quadrics and instances are user primitives; an instance's callback transforms the ray
 //! and asks another `Bvh`.
 //!
 //! The same hit (primitive and every bit of `t`, `u`, `v`) comes back at every SIMD [`Level`] and from a tree built by
-//! any number of threads: box tests and triangle tests use the same unfused IEEE operations in the same order
+//! any number of threads: triangle tests use the same unfused IEEE operations in the same order
 //! everywhere, and ties are broken by primitive index.
 //!
 //! # Layout
 //! - [`ray`](Ray): what goes in and comes out, and the trait the caller implements.
 //! - `level`: which instructions may be used.
-//! - `build`: primitives, binned SAH, the collapse to eight children.
+//! - `build`: primitives, binned SAH, the collapse to eight children, the packing of triangles.
 //! - `node`: the tree in memory; `validate`: its invariants.
-//! - `triangle`: the watertight test, scalar and four at a time.
-//! - `traverse`: the walk, once for closest hits and once for any hit.
-//! - `lanes`: four floats; `prefetch`: asking for memory early.
+//! - `triangle`: the watertight test, scalar and eight at a time.
+//! - `traverse`: the walk, once for closest hits and once for any hit, for one ray and for packets of sixteen.
+//! - `lanes`: four floats, or eight; `prefetch`: asking for memory early; `pages`: large arrays.
 //!
 //! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);
 //! Wald 2007 (binned SAH); Woop, Benthin, Wald 2013 (watertight triangles); Ize 2013 (conservative boxes);
@@ -27,6 +27,7 @@ mod build;
 mod lanes;
 mod level;
 mod node;
+mod pages;
 mod prefetch;
 mod ray;
 mod traverse;

@@ -1,11 +1,13 @@
-//! The tree in memory: eight-wide nodes, blocks of four triangles, lists of user primitives.
+//! The tree in memory: eight-wide nodes, blocks of triangles that share vertices, lists of user primitives.
 
 use crate::build::BuildReport;
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
-/// Triangles in a block.
-pub(crate) const BLOCK: usize = 4;
+/// Triangles in a block at most.
+pub(crate) const BLOCK: usize = 5;
+/// Vertices of a block at most, and lanes of a test.
+pub(crate) const VERTICES: usize = 8;
 /// Entries of the traversal stack; the builder guarantees that no tree needs more.
 pub(crate) const STACK: usize = 256;
 /// Most primitives a tree can hold.
@@ -72,39 +74,84 @@ impl Child {
     }
 }
 
-/// Four triangles, structure of arrays, 160 bytes. Unused lanes repeat the last triangle.
+/// Up to five triangles between up to eight vertices, two cache lines. Unused lanes repeat the last triangle.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(crate) struct Block {
-    /// Coordinates `[vertex][axis][lane]`.
-    pub vertices: [[[f32; BLOCK]; 3]; 3],
-    /// Primitive index, with [`Block::FILTERED`] and, in lane 0, [`Block::LAST`].
-    pub ids: [u32; BLOCK],
+    /// Coordinates `[axis][vertex]`; those of unused vertices repeat the first.
+    pub vertices: [[f32; VERTICES]; 3],
+    /// The three bits at `4 i` of entry `c` say which vertex is corner `c` of the triangle in lane `i`. The bits between
+    /// say the rest: the first of entry 0 whether the block is the last of its leaf, the first three of entry 1 how many
+    /// triangles there are.
+    pub corners: [u32; 3],
+    /// Primitive indices, with [`Block::FILTERED`].
+    ids: [u32; BLOCK],
 }
 
 impl Block {
-    /// Set when the triangle's hits go through the filter.
+    /// Set in an id when the triangle's hits go through the filter.
     pub const FILTERED: u32 = 1 << 31;
-    /// Set in lane 0 of the last block of a leaf.
-    pub const LAST: u32 = 1 << 30;
     /// The bits of an id that are the primitive index.
-    pub const INDEX: u32 = Self::LAST - 1;
+    pub const INDEX: u32 = (1 << 30) - 1;
+
+    /// A block of these triangles (1 to 5 of them), given by their vertices and ids.
+    pub fn new(
+        mut vertices: [[f32; VERTICES]; 3],
+        n_vertices: usize,
+        triangles: &[[u32; 3]],
+        ids: &[u32],
+        is_last: bool,
+    ) -> Self {
+        for axis in &mut vertices {
+            let first = axis[0];
+            axis[n_vertices..].fill(first);
+        }
+        let mut block = Self { vertices, corners: [0; 3], ids: [0; BLOCK] };
+        let last = triangles.len() - 1;
+        for lane in 0..VERTICES {
+            for c in 0..3 {
+                block.corners[c] |= triangles[lane.min(last)][c] << (4 * lane);
+            }
+        }
+        block.corners[0] |= u32::from(is_last) << 3;
+        for bit in 0..3 {
+            block.corners[1] |= (triangles.len() as u32 >> bit & 1) << (4 * bit + 3);
+        }
+        for (i, id) in block.ids.iter_mut().enumerate() {
+            *id = ids[i.min(last)];
+        }
+        block
+    }
+
+    /// Number of triangles.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        let word = self.corners[1] >> 3;
+        (word & 1 | word >> 3 & 2 | word >> 6 & 4) as usize
+    }
+
+    /// Whether it is the last block of a leaf.
+    #[inline(always)]
+    pub fn is_last(&self) -> bool {
+        self.corners[0] & 8 != 0
+    }
+
+    /// The id of the triangle in a lane.
+    #[inline(always)]
+    pub fn id(&self, lane: usize) -> u32 {
+        self.ids[lane.min(BLOCK - 1)]
+    }
+
+    /// The vertex that is a corner of the triangle in a lane.
+    #[inline(always)]
+    pub fn corner(&self, lane: usize, corner: usize) -> usize {
+        (self.corners[corner] >> (4 * lane)) as usize & (VERTICES - 1)
+    }
 
     /// The corners of the triangle in a lane.
     #[inline]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.vertices.map(|p| p.map(|c| c[lane]))
-    }
-
-    /// Whether a lane (not the first) is unused, as all after it are.
-    #[inline(always)]
-    pub fn repeats(&self, lane: usize) -> bool {
-        (self.ids[lane] ^ self.ids[lane - 1]) & Self::INDEX == 0
-    }
-
-    #[inline(always)]
-    pub fn is_last(&self) -> bool {
-        self.ids[0] & Self::LAST != 0
+        [0, 1, 2].map(|c| self.vertices.map(|axis| axis[self.corner(lane, c)]))
     }
 }
 
@@ -140,4 +187,4 @@ impl Bvh {
 }
 
 const _: () = assert!(size_of::<Node>() == 224);
-const _: () = assert!(size_of::<Block>() == 160);
+const _: () = assert!(size_of::<Block>() == 128);

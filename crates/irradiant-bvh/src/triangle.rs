@@ -9,8 +9,8 @@
 //! A hit must be farther than the error bound of its own `t` (Pharr et al. 2023, section 6.8.4), so a ray leaving a
 //! surface does not meet it again because of rounding alone. We take differences of plain products where they fuse.
 
-use crate::lanes::Lanes;
-use crate::node::{BLOCK, Block};
+use crate::lanes::{Eight, Lanes};
+use crate::node::Block;
 use crate::ray::Ray;
 
 /// `f32` rounding unit.
@@ -72,7 +72,7 @@ pub(crate) struct Candidate {
 
 /// The specification: the hit of `vertices` with `t` beyond its error bound, whatever its upper end.
 ///
-/// The lanes of [`intersect_block`] do the same operations in the same order.
+/// The lanes of `intersect_sheared` do the same operations in the same order.
 #[inline]
 pub(crate) fn intersect(vertices: &[[f32; 3]; 3], shear: &Shear) -> Option<Candidate> {
     let [kx, ky, kz] = shear.axes;
@@ -143,23 +143,17 @@ pub(crate) struct Candidates<F: Lanes> {
     pub v: F::Array,
 }
 
-/// Four triangles at once: the candidates with `t <= t_far`, bit for bit those of [`intersect`]; `None` if there are
-/// none, or else perhaps.
+/// The triangles of a block at once: the candidates with `t <= t_far`, bit for bit those of [`intersect`]; `None` if
+/// there are none, or else perhaps. Each vertex is sheared once.
 #[inline(always)]
-pub(crate) fn intersect_block<F: Lanes<Array = [f32; BLOCK]>>(
-    block: &Block,
-    shear: &Shear,
-    t_far: f32,
-) -> Option<Candidates<F>> {
-    let [x, y, z] = shear.axes;
-    let [a, b, c] = &block.vertices;
-    let vertices = [
-        [F::load(&a[x]), F::load(&a[y]), F::load(&a[z])],
-        [F::load(&b[x]), F::load(&b[y]), F::load(&b[z])],
-        [F::load(&c[x]), F::load(&c[y]), F::load(&c[z])],
-    ];
-    let three = |[x, y, z]: [f32; 3]| [F::splat(x), F::splat(y), F::splat(z)];
-    let (mut found, strange) = intersect_lanes(vertices, three(shear.origin), three(shear.shear), F::splat(t_far))?;
+pub(crate) fn intersect_block<E: Eight>(block: &Block, shear: &Shear, t_far: f32) -> Option<Candidates<E>> {
+    let [kx, ky, kz] = shear.axes;
+    let [ox, oy, oz] = [E::splat(shear.origin[0]), E::splat(shear.origin[1]), E::splat(shear.origin[2])];
+    let [sx, sy, sz] = [E::splat(shear.shear[0]), E::splat(shear.shear[1]), E::splat(shear.shear[2])];
+    let z = E::load(&block.vertices[kz]) - oz;
+    let x = (E::load(&block.vertices[kx]) - ox) + sx * z;
+    let y = (E::load(&block.vertices[ky]) - oy) + sy * z;
+    let (mut found, strange) = intersect_sheared(E::choose([x, y, z], block.corners), sz, E::splat(t_far))?;
     if strange != 0 {
         again_in_double(block, shear, t_far, strange, &mut found);
     }
@@ -167,7 +161,7 @@ pub(crate) fn intersect_block<F: Lanes<Array = [f32; BLOCK]>>(
 }
 
 /// One triangle or one ray in each lane; `vertices` and `origin` along the axes of the [`Shear`]. Candidates with
-/// `t <= t_far`, bit for bit those of [`intersect`], and a mask of lanes that must be asked with that.
+/// `t <= t_far`, bit for bit those of [`intersect`], and a mask of lanes that must be asked with that one.
 #[inline(always)]
 pub(crate) fn intersect_lanes<F: Lanes>(
     vertices: [[F; 3]; 3],
@@ -179,6 +173,16 @@ pub(crate) fn intersect_lanes<F: Lanes>(
     let (z0, z1, z2) = (z0 - oz, z1 - oz, z2 - oz);
     let (x0, x1, x2) = ((x0 - ox) + sx * z0, (x1 - ox) + sx * z1, (x2 - ox) + sx * z2);
     let (y0, y1, y2) = ((y0 - oy) + sy * z0, (y1 - oy) + sy * z1, (y2 - oy) + sy * z2);
+    intersect_sheared([[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]], sz, t_far)
+}
+
+/// The same from the sheared vertices on.
+#[inline(always)]
+fn intersect_sheared<F: Lanes>(
+    [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]]: [[F; 3]; 3],
+    sz: F,
+    t_far: F,
+) -> Option<(Candidates<F>, u32)> {
     let e0 = x1 * y2 - y1 * x2;
     let e1 = x2 * y0 - y2 * x0;
     let e2 = x0 * y1 - y0 * x1;
@@ -222,13 +226,7 @@ pub(crate) fn intersect_lanes<F: Lanes>(
 
 #[cold]
 #[inline(never)]
-fn again_in_double<F: Lanes<Array = [f32; BLOCK]>>(
-    block: &Block,
-    shear: &Shear,
-    t_far: f32,
-    mut lanes: u32,
-    out: &mut Candidates<F>,
-) {
+fn again_in_double<E: Eight>(block: &Block, shear: &Shear, t_far: f32, mut lanes: u32, out: &mut Candidates<E>) {
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;

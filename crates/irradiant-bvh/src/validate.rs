@@ -1,6 +1,6 @@
 //! What must be true of every tree.
 
-use crate::node::{BLOCK, Block, Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::node::{BLOCK, Block, Bvh, Child, LAST_USER, Node, VERTICES, WIDTH};
 
 impl Bvh {
     /// Checks that every box holds what is below it, that every primitive is there exactly once, and that the
@@ -64,16 +64,16 @@ impl Bvh {
         let mut all = EMPTY;
         for index in child.index().. {
             let block = self.blocks.get(index).ok_or_else(|| format!("there is no block {index}"))?;
-            for lane in 0..BLOCK {
-                for p in &block.vertices {
-                    let p = p.map(|c| c[lane]);
+            if block.count() == 0 || block.count() > BLOCK {
+                return Err(format!("block {index} has {} triangles", block.count()));
+            }
+            for lane in 0..VERTICES {
+                for p in block.triangle(lane) {
                     all = union(all, [p, p]);
                 }
-                let id = block.ids[lane] & Block::INDEX;
-                let is_repeat = lane > 0 && id == block.ids[lane - 1] & Block::INDEX;
-                if !is_repeat {
-                    seen.triangles.push(id);
-                }
+            }
+            for lane in 0..block.count() {
+                seen.triangles.push(block.id(lane) & Block::INDEX);
             }
             if block.is_last() {
                 break;

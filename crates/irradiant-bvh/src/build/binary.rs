@@ -6,8 +6,8 @@
 use super::gather::Ref;
 use crate::lanes::{Lanes, Native};
 
-/// Ranges of this many triangles or fewer are not split: they fit one block.
-const LEAF: usize = 4;
+/// Ranges of this many triangles or fewer are not split: connected ones fit one block.
+const LEAF: usize = 5;
 /// Bins along an axis at most.
 const MAX_BINS: usize = 64;
 /// Subtrees deeper than this are split in halves: it bounds the recursion for boxes whose sizes span hundreds of octaves.
@@ -127,7 +127,7 @@ struct Bin {
 /// Blocks that `n` triangles fill, as a cost.
 #[inline(always)]
 fn blocks(n: u32) -> f32 {
-    n.div_ceil(4) as f32
+    n.div_ceil(LEAF as u32) as f32
 }
 
 /// Maps centres to bins.

@@ -6,9 +6,11 @@
 use rayon::prelude::*;
 
 use super::binary;
-use super::gather::{self, FAR, Ref};
+use super::gather::{FAR, Ref};
+use super::pack::{self, Packed};
 use super::{BuildInput, BuildReport, BuildSettings};
-use crate::node::{BLOCK, Block, Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::node::{Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::pages;
 
 /// The choice for `n` slots at index `n - 1`: how many go to the left child; 0 means a leaf (for one slot), or
 /// "as with one slot fewer". With one slot, the number counts out of the eight of the new node.
@@ -20,6 +22,8 @@ struct Plan<'a> {
     settings: &'a BuildSettings,
     /// Brings extents to about 1 before areas are taken.
     scale: f64,
+    /// Triangles that a block of a leaf holds, if there are enough.
+    per_block: f32,
 }
 
 /// Costs of a subtree in 1 to 7 slots.
@@ -37,18 +41,6 @@ pub(crate) fn collapse(
     settings: &BuildSettings,
     mut report: BuildReport,
 ) -> Bvh {
-    let root = &tree[0];
-    let extent = (0..3).map(|a| f64::from(root.hi[a]) - f64::from(root.lo[a])).fold(0.0, f64::max);
-    let plan = Plan { tree, refs: &refs, settings, scale: if extent > 0.0 { 1.0 / extent } else { 0.0 } };
-    let mut choices = vec![[0u8; 8]; tree.len()];
-    let costs = plan.decide(0, 0, &mut choices);
-    let root_area = plan.half_area(0);
-
-    // Topology: which wide node holds what, and where leaves go. Children of a node get neighbouring indices.
-    let mut layout = Layout::default();
-    layout.lay_out(&plan, &choices);
-    drop(choices);
-
     let starts: Vec<u32> = input
         .meshes
         .iter()
@@ -58,9 +50,40 @@ pub(crate) fn collapse(
             Some(first)
         })
         .collect();
-    let nodes: Vec<Node> = layout.nodes.par_iter().with_min_len(512).map(|wide| wide_node(tree, wide)).collect();
-    let blocks: Vec<Block> =
-        layout.blocks.par_iter().with_min_len(512).map(|b| fill_block(b, &refs, input, &starts)).collect();
+    let root = &tree[0];
+    let extent = (0..3).map(|a| f64::from(root.hi[a]) - f64::from(root.lo[a])).fold(0.0, f64::max);
+    let plan = Plan {
+        tree,
+        refs: &refs,
+        settings,
+        scale: if extent > 0.0 { 1.0 / extent } else { 0.0 },
+        per_block: pack::triangles_per_block(&refs, input, &starts),
+    };
+    let mut choices = vec![[0u8; 8]; tree.len()];
+    let costs = plan.decide(0, 0, &mut choices);
+    let root_area = plan.half_area(0);
+
+    // Topology: which wide node holds what, and where leaves go. Children of a node get neighbouring indices.
+    let mut layout = Layout::default();
+    layout.lay_out(&plan, &choices);
+    drop(choices);
+
+    let packed: Vec<Packed> =
+        layout.leaves.par_chunks(1024).map(|runs| pack::pack(runs, &refs, input, &starts)).collect();
+    let mut blocks = pages::with_capacity(packed.iter().map(|p| p.blocks.len()).sum());
+    let mut first_blocks: Vec<u32> = Vec::with_capacity(layout.leaves.len());
+    for part in packed {
+        let first_block = blocks.len() as u32;
+        blocks.extend(part.blocks);
+        first_blocks.extend(part.first_blocks.iter().map(|b| b + first_block));
+    }
+    let mut nodes: Vec<Node> = pages::with_capacity(layout.nodes.len());
+    layout
+        .nodes
+        .par_iter()
+        .with_min_len(512)
+        .map(|wide| wide_node(tree, wide, &first_blocks))
+        .collect_into_vec(&mut nodes);
     let mut users = Vec::with_capacity(report.users);
     for leaf in &layout.users {
         let mut ids: Vec<u32> = refs[leaf.first..leaf.first + leaf.count].iter().map(Ref::id).collect();
@@ -116,7 +139,7 @@ impl Plan<'_> {
         let (cost, k) = share(WIDTH);
         (of[0], mine[0]) = (cost + area * f64::from(self.settings.node_cost), k);
         let mixed = has_triangles && has_users;
-        let fits = has_users || node.count as usize <= BLOCK * self.settings.max_leaf_blocks as usize;
+        let fits = has_users || node.count as f32 <= self.per_block * self.settings.max_leaf_blocks as f32;
         // The root is always a wide node, so that traversal has somewhere to start.
         if !mixed && fits && n != 0 {
             let leaf = area * self.leaf_cost(node.count, has_users);
@@ -135,28 +158,27 @@ impl Plan<'_> {
         f64::from(if is_user {
             self.settings.user_cost * count as f32
         } else {
-            self.settings.block_cost * count.div_ceil(BLOCK as u32) as f32
+            self.settings.block_cost * f32::max(1.0, count as f32 / self.per_block)
         })
     }
 }
 
-/// A wide node: the binary nodes in its slots, and references to them.
+/// A wide node: the binary nodes in its slots, and references to them; leaves of triangles by number.
 struct WideNode {
     n: u8,
     slots: [(u32, Child); WIDTH],
 }
 
-/// A run of references that go to one leaf, or one block of it.
-struct Run {
-    first: usize,
-    count: usize,
-    last: bool,
+/// A run of references that go to one leaf.
+pub(super) struct Run {
+    pub first: usize,
+    pub count: usize,
 }
 
 #[derive(Default)]
 struct Layout {
     nodes: Vec<WideNode>,
-    blocks: Vec<Run>,
+    leaves: Vec<Run>,
     users: Vec<Run>,
 }
 
@@ -187,16 +209,12 @@ impl Layout {
                     inner.push((self.nodes.len() - 1, child, first));
                     Child::node(self.nodes.len() - 1)
                 } else if plan.refs[first].is_user() {
-                    self.users.push(Run { first, count, last: true });
+                    self.users.push(Run { first, count });
                     n_users += count;
                     Child::users(n_users - count)
                 } else {
-                    let start = self.blocks.len();
-                    for k in (0..count).step_by(BLOCK) {
-                        let last = k + BLOCK >= count;
-                        self.blocks.push(Run { first: first + k, count: BLOCK.min(count - k), last });
-                    }
-                    Child::triangles(start)
+                    self.leaves.push(Run { first, count });
+                    Child::triangles(self.leaves.len() - 1)
                 };
                 self.nodes[wide].slots[i] = (child as u32, reference);
             }
@@ -226,7 +244,7 @@ fn open(plan: &Plan, choices: &[Choices], n: usize, first: usize, k: usize, m: u
     }
 }
 
-fn wide_node(tree: &[binary::Node], wide: &WideNode) -> Node {
+fn wide_node(tree: &[binary::Node], wide: &WideNode, first_blocks: &[u32]) -> Node {
     let mut node = Node::EMPTY;
     for (i, &(child, reference)) in wide.slots[..usize::from(wide.n)].iter().enumerate() {
         let source = &tree[child as usize];
@@ -235,28 +253,9 @@ fn wide_node(tree: &[binary::Node], wide: &WideNode) -> Node {
             node.planes[2 * axis][i] = if lo <= -FAR { f32::NEG_INFINITY } else { lo };
             node.planes[2 * axis + 1][i] = if hi >= FAR { f32::INFINITY } else { hi };
         }
-        node.children[i] = reference;
+        let is_triangles = reference.is_leaf() && !reference.is_users();
+        node.children[i] =
+            if is_triangles { Child::triangles(first_blocks[reference.index()] as usize) } else { reference };
     }
     node
-}
-
-fn fill_block(run: &Run, refs: &[Ref], input: &BuildInput, starts: &[u32]) -> Block {
-    let mut block = Block { vertices: [[[0.0; BLOCK]; 3]; 3], ids: [0; BLOCK] };
-    for lane in 0..BLOCK {
-        let id = refs[run.first + lane.min(run.count - 1)].id();
-        let m = starts.partition_point(|&s| s <= id) - 1;
-        let mesh = &input.meshes[m];
-        // Gathered triangles have sound indices.
-        let corners = gather::vertices(mesh, (id - starts[m]) as usize).unwrap_or_default();
-        for vertex in 0..3 {
-            for axis in 0..3 {
-                block.vertices[vertex][axis][lane] = corners[vertex][axis];
-            }
-        }
-        block.ids[lane] = id | if mesh.filtered { Block::FILTERED } else { 0 };
-    }
-    if run.last {
-        block.ids[0] |= Block::LAST;
-    }
-    block
 }

@@ -7,6 +7,7 @@
 mod binary;
 mod collapse;
 mod gather;
+mod pack;
 
 use crate::node::{Bvh, MAX_PRIMITIVES, STACK};
 
@@ -35,7 +36,7 @@ pub struct BuildInput<'a> {
 pub struct BuildSettings {
     /// Cost of testing a node's eight boxes and sorting what was hit.
     pub node_cost: f32,
-    /// Cost of testing a block of up to four triangles.
+    /// Cost of testing a block of up to five triangles.
     pub block_cost: f32,
     /// Cost of testing a user primitive.
     pub user_cost: f32,
@@ -66,7 +67,7 @@ pub struct BuildReport {
     pub bad_boxes: usize,
     /// Eight-wide nodes.
     pub nodes: usize,
-    /// Blocks of four triangles.
+    /// Blocks of up to five triangles.
     pub blocks: usize,
     /// Expected cost of a random ray through the bounds, in the units of [`BuildSettings`].
     pub sah_cost: f64,
@@ -138,9 +139,12 @@ mod tests {
         let node = |n: &Node| {
             n.planes.iter().flatten().map(|x| x.to_bits()).chain(n.children.map(|c| c.0)).collect::<Vec<_>>()
         };
-        let block =
-            |b: &Block| b.vertices.iter().flatten().flatten().map(|x| x.to_bits()).chain(b.ids).collect::<Vec<_>>();
-        (bvh.nodes.iter().flat_map(node).collect(), bvh.blocks.iter().flat_map(block).collect(), bvh.users.clone())
+        let block = |b: &Block| {
+            let vertices = b.vertices.iter().flatten().map(|x| x.to_bits());
+            vertices.chain(b.corners).chain((0..8).map(|lane| b.id(lane))).collect::<Vec<_>>()
+        };
+        let blocks = bvh.blocks.iter().flat_map(block).collect();
+        (bvh.nodes.iter().flat_map(node).collect(), blocks, bvh.users.clone())
     }
 
     #[test]

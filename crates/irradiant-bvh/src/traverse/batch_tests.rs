@@ -1,4 +1,7 @@
 //! Batches against the same rays one by one, at every level. Exact: false alarms are impossible.
+//!
+//! Seen to fail when broken: the entry bound from one end of the interval of reciprocals only; the far end of the packet
+//! taken from one ray; rays of different fastest axes sheared alike.
 
 use super::tests::{Balls, Random, Soup, ball, lattice_soup, random_soup, ray_at};
 use super::*;
@@ -89,15 +92,15 @@ fn check(name: &str, soup: &Soup, scale: f32, n_batches: usize) {
 
 #[test]
 fn batches_meet_what_single_rays_meet() {
-    check("small triangles", &random_soup(2000, 0.05, 1.0, 1), 1.0, 4000);
-    check("large triangles", &random_soup(60, 1.0, 1.0, 2), 1.0, 2000);
+    check("small triangles", &random_soup(2000, 0.05, 1.0, 1), 1.0, 1000);
+    check("large triangles", &random_soup(60, 1.0, 1.0, 2), 1.0, 1000);
     check("few", &random_soup(5, 1.0, 1.0, 3), 1.0, 500);
-    check("ball", &ball(24, 11), 1.0, 4000);
+    check("ball", &ball(24, 11), 1.0, 1000);
 }
 
 #[test]
 fn batches_agree_on_coincident_and_axis_aligned_triangles() {
-    check("lattice", &lattice_soup(120, 4), 1.0, 4000);
+    check("lattice", &lattice_soup(120, 4), 1.0, 1000);
 }
 
 #[test]
@@ -110,7 +113,7 @@ fn batches_agree_at_extreme_scales() {
         let far = random_soup(1, 1.0, 10f32.powi(i / 2 - 10), 100 + i as u64);
         mixed.push(far.triangles[0].map(|v| far.positions[v as usize]));
     }
-    check("mixed scales", &mixed, 1.0, 2000);
+    check("mixed scales", &mixed, 1.0, 1000);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Eight boxes at once.
 
 use super::PADDING;
-use crate::lanes::Lanes;
+use crate::lanes::{Eight, Lanes, Twice};
 use crate::node::{Node, WIDTH};
 use crate::ray::Ray;
 
@@ -13,7 +13,7 @@ pub(crate) struct Near(pub [f32; WIDTH]);
 /// A ray prepared for testing boxes.
 pub(crate) trait BoxTest: Copy {
     /// Lanes for triangles.
-    type Four: Lanes<Array = [f32; 4]>;
+    type Eight: Eight;
     fn new(ray: &Ray) -> Self;
     /// Bit `i` says that the ray enters child `i` before `far`; then `near[i]` says where.
     fn enter(&self, node: &Node, far: f32) -> (u32, Near);
@@ -37,7 +37,7 @@ pub(crate) struct Halves<F> {
 }
 
 impl<F: Lanes<Array = [f32; 4]>> BoxTest for Halves<F> {
-    type Four = F;
+    type Eight = Twice<F>;
 
     #[inline(always)]
     fn new(ray: &Ray) -> Self {
@@ -75,7 +75,7 @@ pub(crate) mod x86 {
     use core::arch::x86_64::*;
 
     use super::*;
-    use crate::lanes::{Avx, Sse};
+    use crate::lanes::Avx;
     use crate::level::Level;
     use crate::node::Bvh;
     use crate::ray::{Closest, Leaves};
@@ -129,7 +129,7 @@ pub(crate) mod x86 {
     }
 
     impl BoxTest for Whole {
-        type Four = Sse;
+        type Eight = Avx;
 
         #[inline(always)]
         #[allow(unsafe_code)]
@@ -147,6 +147,95 @@ pub(crate) mod x86 {
         }
     }
 
+    /// One register and fused arithmetic: `plane * inverse - origin * inverse` in one operation each way. What the
+    /// product with the origin loses, which may be large against a short distance, is taken off where a box is entered
+    /// and added where it is left, so that no box is missed; only which boxes are looked at depends on it.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Fused {
+        inverse: [__m256; 3],
+        entering: [__m256; 3],
+        padded: [__m256; 3],
+        leaving: [__m256; 3],
+        first: [usize; 3],
+    }
+
+    impl Fused {
+        /// Two roundings of the product with the origin, twice over.
+        const LOST: f32 = 1.0 / (1 << 22) as f32;
+
+        /// Whether nothing overflows: every other ray takes [`Whole`].
+        #[inline(always)]
+        pub(crate) fn suits(ray: &Ray) -> bool {
+            let (inverse, _) = reciprocal(ray);
+            // Written so that NaN fails.
+            (0..3).all(|k| inverse[k].abs() < 1e30 && (ray.o[k] * inverse[k]).abs() < 1e30)
+        }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    #[inline]
+    fn prepare_fused(ray: &Ray) -> Fused {
+        let (inverse, first) = reciprocal(ray);
+        let splat = |a: f32| _mm256_set1_ps(a);
+        let [x, y, z] = inverse;
+        let padded = [x * PADDING, y * PADDING, z * PADDING];
+        let entering = |k: usize| {
+            let product = ray.o[k] * inverse[k];
+            splat(-product - product.abs() * Fused::LOST)
+        };
+        let leaving = |k: usize| {
+            let product = ray.o[k] * padded[k];
+            splat(product.abs() * Fused::LOST - product)
+        };
+        Fused {
+            inverse: [splat(x), splat(y), splat(z)],
+            entering: [entering(0), entering(1), entering(2)],
+            padded: [splat(padded[0]), splat(padded[1]), splat(padded[2])],
+            leaving: [leaving(0), leaving(1), leaving(2)],
+            first,
+        }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    #[inline]
+    fn enter_fused(w: &Fused, node: &Node, far: f32) -> (u32, Near) {
+        #[allow(unsafe_code)]
+        // SAFETY: each plane is eight floats, read unaligned. Guard: `all_levels_agree_with_brute_force`.
+        let plane = |p: usize| unsafe { _mm256_loadu_ps(node.planes[p].as_ptr()) };
+        let enters = |k: usize| _mm256_fmadd_ps(plane(w.first[k]), w.inverse[k], w.entering[k]);
+        let leaves = |k: usize| _mm256_fmadd_ps(plane(w.first[k] ^ 1), w.padded[k], w.leaving[k]);
+        let near = _mm256_max_ps(_mm256_max_ps(enters(0), enters(1)), _mm256_max_ps(enters(2), _mm256_setzero_ps()));
+        let far =
+            _mm256_min_ps(_mm256_min_ps(leaves(0), leaves(1)), _mm256_min_ps(leaves(2), _mm256_set1_ps(far * PADDING)));
+        let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(near, far);
+        let mut out = Near([0.0; WIDTH]);
+        #[allow(unsafe_code)]
+        // SAFETY: `Near` is eight floats, aligned to 32. Guard: as above.
+        unsafe {
+            _mm256_store_ps(out.0.as_mut_ptr(), near);
+        }
+        (_mm256_movemask_ps(inside) as u32, out)
+    }
+
+    impl BoxTest for Fused {
+        type Eight = Avx;
+
+        #[inline(always)]
+        #[allow(unsafe_code)]
+        fn new(ray: &Ray) -> Self {
+            // SAFETY: only the entry points below instantiate the walk with `Fused`, and they check for AVX2 and FMA.
+            // Guard: `levels_beyond_the_machine_fall_back`.
+            unsafe { prepare_fused(ray) }
+        }
+
+        #[inline(always)]
+        #[allow(unsafe_code)]
+        fn enter(&self, node: &Node, far: f32) -> (u32, Near) {
+            // SAFETY: as in `new`.
+            unsafe { enter_fused(self, node, far) }
+        }
+    }
+
     /// The walk compiled for one set of features, behind a check that the machine has them.
     macro_rules! entry_points {
         ($closest:ident, $any:ident, $level:expr, $features:literal) => {
@@ -155,7 +244,11 @@ pub(crate) mod x86 {
             pub(crate) fn $closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
                 #[target_feature(enable = $features)]
                 fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
-                    walk::closest::<Whole, L>(bvh, ray, leaves)
+                    if Fused::suits(ray) {
+                        walk::closest::<Fused, L>(bvh, ray, leaves)
+                    } else {
+                        walk::closest::<Whole, L>(bvh, ray, leaves)
+                    }
                 }
                 assert!($level <= Level::detect());
                 // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
@@ -167,7 +260,11 @@ pub(crate) mod x86 {
             pub(crate) fn $any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
                 #[target_feature(enable = $features)]
                 fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
-                    walk::any::<Whole, L>(bvh, ray, leaves)
+                    if Fused::suits(ray) {
+                        walk::any::<Fused, L>(bvh, ray, leaves)
+                    } else {
+                        walk::any::<Whole, L>(bvh, ray, leaves)
+                    }
                 }
                 assert!($level <= Level::detect());
                 // SAFETY: as above.
@@ -185,7 +282,7 @@ pub(crate) mod x86 {
         leaves: &L,
         out: &mut [Option<Closest<L::UserHit>>],
     ) -> bool {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [Option<Closest<L::UserHit>>]) -> bool {
             packet::closest::<Avx, Whole, L>(bvh, rays, leaves, out)
         }
@@ -198,7 +295,7 @@ pub(crate) mod x86 {
     #[inline]
     #[allow(unsafe_code)]
     pub(crate) fn any_packet<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
             packet::any::<Avx, Whole, L>(bvh, rays, leaves, out)
         }
@@ -207,6 +304,6 @@ pub(crate) mod x86 {
         unsafe { compiled(bvh, rays, leaves, out) }
     }
 
-    entry_points!(closest_avx2, any_avx2, Level::Avx2, "avx2,bmi1,bmi2,lzcnt,popcnt");
-    entry_points!(closest_avx512, any_avx512, Level::Avx512, "avx512f,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt");
+    entry_points!(closest_avx2, any_avx2, Level::Avx2, "avx2,fma,bmi1,bmi2,lzcnt,popcnt");
+    entry_points!(closest_avx512, any_avx512, Level::Avx512, "avx512f,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt");
 }

@@ -1,7 +1,7 @@
 //! From a ray to what it meets, at any [`Level`].
 //!
-//! Children are visited by increasing (entry distance, reference), a total order, and box tests are the same unfused
-//! operations everywhere, so every level walks the same way through the tree. Distances at which a box is left are
+//! Box tests never miss a box that the specification enters, though they may enter more, so every level and every packet
+//! finds the same hits, whatever way it takes through the tree. Distances at which a box is left are
 //! scaled up by `PADDING`, which covers the rounding of the slab test (Ize 2013) and that of the shear in the
 //! triangle test.
 

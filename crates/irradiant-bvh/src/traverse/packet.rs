@@ -12,7 +12,7 @@ use super::scalar::counts;
 use super::walk::{self, Stack};
 use super::{Best, PADDING, is_proper};
 use crate::lanes::{Lanes, Native};
-use crate::node::{BLOCK, Block, Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidate, Shear};
 
@@ -24,7 +24,7 @@ const GROUPS: usize = 2;
 pub(crate) const PACKET: usize = GROUP * GROUPS;
 /// This many rays or fewer go on alone.
 const FEW: u32 = 2;
-/// At a leaf, this many rays of a group or fewer are tested one by one, each against four triangles.
+/// At a leaf, this many rays of a group or fewer are tested one by one, each against all triangles of a block.
 const FEW_AT_LEAF: u32 = 3;
 /// Directions of a packet differ by this much of their size along an axis at most.
 const SPREAD: f32 = 0.5;
@@ -199,11 +199,12 @@ impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
         lane: usize,
         t: &[f32; GROUP],
     ) -> Option<triangle::Candidates<E>> {
-        let [a, b, c] = &block.vertices;
+        let (a, b, c) = (block.corner(lane, 0), block.corner(lane, 1), block.corner(lane, 2));
+        let [x_of, y_of, z_of] = [&block.vertices[x], &block.vertices[y], &block.vertices[z]];
         let along = [
-            [E::splat(a[x][lane]), E::splat(a[y][lane]), E::splat(a[z][lane])],
-            [E::splat(b[x][lane]), E::splat(b[y][lane]), E::splat(b[z][lane])],
-            [E::splat(c[x][lane]), E::splat(c[y][lane]), E::splat(c[z][lane])],
+            [E::splat(x_of[a]), E::splat(y_of[a]), E::splat(z_of[a])],
+            [E::splat(x_of[b]), E::splat(y_of[b]), E::splat(z_of[b])],
+            [E::splat(x_of[c]), E::splat(y_of[c]), E::splat(z_of[c])],
         ];
         let Group { origin, shear, .. } = &self.groups[g];
         let (mut found, strange) =
@@ -232,24 +233,21 @@ impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
                 if mine.count_ones() > FEW_AT_LEAF
                     && let Some(axes) = self.axes
                 {
-                    for lane in 0..BLOCK {
-                        if lane > 0 && block.repeats(lane) {
-                            break;
-                        }
+                    for lane in 0..block.count() {
                         let Some(found) = self.meet(axes, g, block, lane, &t[g]) else { continue };
                         each(found.mask & mine, |i| {
                             let candidate = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
-                            t[g][i] = hit(GROUP * g + i, block.ids[lane], candidate);
+                            t[g][i] = hit(GROUP * g + i, block.id(lane), candidate);
                         });
                     }
                 } else {
                     each(mine, |i| {
                         let ray = GROUP * g + i;
                         let shear = Shear::new(&self.rays[ray]);
-                        let Some(found) = triangle::intersect_block::<B::Four>(block, &shear, t[g][i]) else { return };
+                        let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, t[g][i]) else { return };
                         each(found.mask, |lane| {
                             let candidate = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
-                            t[g][i] = hit(ray, block.ids[lane], candidate);
+                            t[g][i] = hit(ray, block.id(lane), candidate);
                         });
                     });
                 }

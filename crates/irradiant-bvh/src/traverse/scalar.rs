@@ -1,7 +1,7 @@
 //! The specification: one child and one triangle at a time, in plain Rust.
 
 use super::{Best, PADDING, is_proper};
-use crate::node::{BLOCK, Block, Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Shear};
 
@@ -66,9 +66,9 @@ pub(super) fn closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Clo
         } else {
             loop {
                 let block = &bvh.blocks[index];
-                for i in 0..BLOCK {
+                for i in 0..block.count() {
                     if let Some(hit) = triangle::intersect(&block.triangle(i), &shear) {
-                        best.offer_triangle(leaves, ray, block.ids[i], hit.t, hit.u, hit.v);
+                        best.offer_triangle(leaves, ray, block.id(i), hit.t, hit.u, hit.v);
                     }
                 }
                 if block.is_last() {
@@ -111,10 +111,10 @@ pub(super) fn any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
         } else {
             loop {
                 let block = &bvh.blocks[index];
-                for i in 0..BLOCK {
+                for i in 0..block.count() {
                     if let Some(hit) = triangle::intersect(&block.triangle(i), &shear)
                         && hit.t < ray.t_max
-                        && counts(leaves, ray, block.ids[i], hit)
+                        && counts(leaves, ray, block.id(i), hit)
                     {
                         return true;
                     }
