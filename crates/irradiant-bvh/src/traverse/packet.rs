@@ -26,8 +26,9 @@ pub(crate) const PACKET: usize = GROUP * GROUPS;
 const FEW: u32 = 2;
 /// At a leaf, this many rays of a group or fewer are tested one by one, each against all triangles of a block.
 const FEW_AT_LEAF: u32 = 3;
-/// Directions of a packet differ by this much of their size along an axis at most.
-const SPREAD: f32 = 0.5;
+/// Directions of a packet differ by this much of their size along an axis at most. With 0.5 rays to wide lamps were 6 to
+/// 11 % slower than alone; with 0.15 they are within 2 %, and primary rays as before.
+const SPREAD: f32 = 0.15;
 
 /// A child to visit, and where its box is.
 #[derive(Clone, Copy)]
