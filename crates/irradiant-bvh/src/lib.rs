@@ -37,5 +37,6 @@ mod validate;
 pub use build::{BuildInput, BuildReport, BuildSettings, Mesh};
 pub use level::Level;
 pub use node::Bvh;
+pub use pages::vec_on_large_pages;
 pub use prefetch::prefetch_read;
 pub use ray::{Closest, Hit, Leaves, Ray, TrianglesOnly};

@@ -4,10 +4,11 @@
 //! about in it. On Linux we ask for pages of 2 MB, as Embree does.
 
 /// Smaller arrays are left alone.
-const WORTH: usize = 8 << 20;
+const WORTH: usize = 4 << 20;
 
-/// Room for `n` elements, on large pages if the system grants them. What is in the memory does not depend on it.
-pub(crate) fn with_capacity<T>(n: usize) -> Vec<T> {
+/// An empty vector with room for `n` elements, on large pages if they are many and the system grants them. Only speed
+/// depends on it.
+pub fn vec_on_large_pages<T>(n: usize) -> Vec<T> {
     let vec = Vec::<T>::with_capacity(n);
     advise(vec.as_ptr().cast(), n * size_of::<T>());
     vec
@@ -47,7 +48,7 @@ mod tests {
     #[test]
     fn large_arrays_hold_what_is_put_in() {
         for n in [0, 1, 1000, 3 << 20] {
-            let mut numbers = with_capacity::<u64>(n);
+            let mut numbers = vec_on_large_pages::<u64>(n);
             assert!(numbers.capacity() >= n);
             numbers.extend(0..n as u64);
             assert_eq!(numbers.iter().sum::<u64>(), (n as u64 * (n as u64).saturating_sub(1)) / 2);

@@ -10,7 +10,7 @@ use super::gather::{FAR, Ref};
 use super::pack::{self, Packed};
 use super::{BuildInput, BuildReport, BuildSettings};
 use crate::node::{Bvh, Child, LAST_USER, Node, WIDTH};
-use crate::pages;
+use crate::pages::vec_on_large_pages;
 
 /// The choice for `n` slots at index `n - 1`: how many go to the left child; 0 means a leaf (for one slot), or
 /// "as with one slot fewer". With one slot, the number counts out of the eight of the new node.
@@ -70,14 +70,14 @@ pub(crate) fn collapse(
 
     let packed: Vec<Packed> =
         layout.leaves.par_chunks(1024).map(|runs| pack::pack(runs, &refs, input, &starts)).collect();
-    let mut blocks = pages::with_capacity(packed.iter().map(|p| p.blocks.len()).sum());
+    let mut blocks = vec_on_large_pages(packed.iter().map(|p| p.blocks.len()).sum());
     let mut first_blocks: Vec<u32> = Vec::with_capacity(layout.leaves.len());
     for part in packed {
         let first_block = blocks.len() as u32;
         blocks.extend(part.blocks);
         first_blocks.extend(part.first_blocks.iter().map(|b| b + first_block));
     }
-    let mut nodes: Vec<Node> = pages::with_capacity(layout.nodes.len());
+    let mut nodes: Vec<Node> = vec_on_large_pages(layout.nodes.len());
     layout
         .nodes
         .par_iter()

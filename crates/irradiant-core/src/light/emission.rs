@@ -105,10 +105,13 @@ fn exact_half(v: f32) -> Option<u16> {
 impl Pixels {
     fn new(pixels: Box<[[f32; 3]]>) -> Self {
         let halves = |rgb: &[f32; 3]| Some([exact_half(rgb[0])?, exact_half(rgb[1])?, exact_half(rgb[2])?]);
-        match pixels.iter().map(halves).collect::<Option<Box<[_]>>>() {
-            Some(halves) => Self::Half(halves),
-            None => Self::Single(pixels),
+        // A sky is looked up all over, more than the processor's table of small pages covers.
+        let mut all = irradiant_bvh::vec_on_large_pages(pixels.len());
+        for rgb in &pixels {
+            let Some(rgb) = halves(rgb) else { return Self::Single(pixels) };
+            all.push(rgb);
         }
+        Self::Half(all.into_boxed_slice())
     }
 
     #[inline]
