@@ -126,6 +126,11 @@ impl Job {
         &self.integrator
     }
 
+    /// Scattering events at most; `None`: no limit.
+    pub fn max_depth(&self) -> Option<u32> {
+        self.max_depth
+    }
+
     /// The path integrator that replays samples, if this job uses it.
     pub fn path_integrator(&self) -> Option<PathIntegrator> {
         (self.integrator.name() == "path").then(|| PathIntegrator {
