@@ -139,11 +139,6 @@ impl Job {
         })
     }
 
-    /// Scattering events at most.
-    pub fn max_depth(&self) -> Option<u32> {
-        self.max_depth
-    }
-
     /// What the depth limit leaves out, estimated from a few paths without limit (a sixteenth of the picture's, 16384 at most);
     /// `None` without a limit, and of other integrators than `path`.
     pub fn missing_light(&self) -> Option<MissingLight> {
