@@ -4,10 +4,11 @@ use crate::exit::Exit;
 use crate::options::{Color, PictureOptions, parse_duration, parse_exposure};
 use crate::progress::{Reporter, short_count, short_time};
 use crate::say::say;
-use crate::stats::Clock;
+use crate::stats::{self, Clock};
 use clap::Args;
 use irradiant::image::FileFormat;
-use irradiant::{Aov, Error, Job, MaxDepth, Rendering, SceneFile};
+use irradiant::renderer::inspect::{AuditSettings, audit};
+use irradiant::{Aov, Error, IntegratorChoice, Job, MaxDepth, Rendering, SceneFile};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -27,6 +28,13 @@ pub struct RenderArguments {
     /// Stop after this time (60s, 5m, 1h) with what is there
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time: Option<Duration>,
+    /// How rays leave surfaces: robust, or, to see what it is good for, none, epsilon=E, skip-id, project or fp64 (by the
+    /// integrator selfintersection; biased)
+    #[arg(long, value_name = "MODE", value_parser = parse_self_intersection, conflicts_with_all = ["integrator", "estimator"])]
+    self_intersection: Option<SelfIntersection>,
+    /// Trace light from the lamps too (so many paths), and print where the energy goes
+    #[arg(long, value_name = "PATHS", num_args = 0..=1, require_equals = true, default_missing_value = "200000", value_parser = clap::value_parser!(u64).range(1000..=1_000_000_000))]
+    audit: Option<u64>,
     /// Threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
@@ -51,6 +59,24 @@ pub struct RenderArguments {
     quiet: bool,
 }
 
+/// `--self-intersection`: robust is what every integrator does.
+#[derive(Clone, Debug)]
+struct SelfIntersection(Option<IntegratorChoice>);
+
+fn parse_self_intersection(text: &str) -> Result<SelfIntersection, String> {
+    if text == "robust" {
+        return Ok(SelfIntersection(None));
+    }
+    let (leaving, epsilon) = text.split_once('=').map_or((text, None), |(word, e)| (word, Some(e)));
+    let known = ["robust", "none", "epsilon=E", "skip-id", "project", "fp64"];
+    if epsilon.is_some() != (leaving == "epsilon") || !known.iter().any(|k| k.trim_end_matches("=E") == leaving) {
+        return Err(format!("known are {}", known.join(", ")));
+    }
+    let choice = IntegratorChoice::named("selfintersection").and_then(|c| c.with("leaving", leaving));
+    let choice = choice.and_then(|c| epsilon.map_or(Ok(c.clone()), |e| c.with("epsilon", e)));
+    choice.map(|c| SelfIntersection(Some(c))).map_err(|why| why.to_string())
+}
+
 /// Loads, renders, writes.
 pub fn run(arguments: &RenderArguments) -> Exit {
     match render(arguments) {
@@ -71,6 +97,9 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     settings.threads = arguments.threads.unwrap_or(0) as usize;
     settings.time_limit = arguments.time;
     settings.aovs = arguments.aov.clone();
+    if let Some(SelfIntersection(Some(choice))) = &arguments.self_intersection {
+        settings.integrator = Some(choice.clone());
+    }
     if arguments.preview {
         let full = settings.resolution.unwrap_or(file.desc.film.resolution.value);
         settings.resolution = Some(full.map(|n| (n / 2).max(1)));
@@ -119,10 +148,24 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     }
     clock.lap("write");
 
+    let audit = arguments.audit.and_then(|paths| {
+        let settings = AuditSettings { paths, max_depth: job.max_depth(), seed: job.header.seed };
+        let books = audit(&job.scene, &settings);
+        clock.lap("audit");
+        books
+    });
+    match (&audit, arguments.audit) {
+        (Some(books), _) => print!("{}", stats::audit_in_words(&job.scene, books)),
+        (None, Some(_)) => say!("audit: there is no light in the scene"),
+        (None, None) => {}
+    }
     if let Some(path) = &arguments.stats {
         let threads = job_threads(arguments);
         let command: Vec<String> = std::env::args().collect();
-        let json = clock.json(&rendering.stats, threads, &command);
+        let mut json = clock.json(&rendering.stats, threads, &command);
+        if let Some(books) = &audit {
+            json["audit"] = stats::audit_as_json(&job.scene, books);
+        }
         let text = serde_json::to_string_pretty(&json).unwrap_or_default() + "\n";
         irradiant::image::atomic_write(path, text.as_bytes())
             .map_err(|why| Error::Output { path: path.clone(), why })?;

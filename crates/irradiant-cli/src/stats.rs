@@ -1,7 +1,10 @@
 //! Where the time went and what was done: for `--stats` and the closing line. None of it goes into picture files.
 
 use cpu_time::ProcessTime;
+use irradiant::core::scene::Scene;
 use irradiant::renderer::RenderStats;
+use irradiant::renderer::inspect::EnergyAudit;
+use irradiant::renderer::inspect::audit::Power;
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -81,4 +84,50 @@ pub fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
+/// The books of energy as lines.
+pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
+    let total = books.emitted.watts.max(f64::MIN_POSITIVE);
+    let line = |name: &str, p: &Power| {
+        format!("{name:<24} {:>14.6e} W +- {:.1e}  {:>8.3} %\n", p.watts, p.error, 100.0 * p.watts / total)
+    };
+    let mut text = format!("energy: {} particles from the lights, {:.2} events each\n", books.paths, books.mean_events);
+    text += &line("emitted", &books.emitted);
+    text += &format!("{:<24} {:>14.6e} W\n", "  by the lights' formula", books.emitted_by_formula);
+    text += &line("absorbed", &books.absorbed);
+    for (material, power) in &books.by_material {
+        text += &line(&format!("  by {}", scene.material_name(*material)), power);
+    }
+    text += &line("escaped", &books.escaped);
+    text += &line("cut off by the limit", &books.cut_off);
+    text += &format!(
+        "{:<24} {:>14.6e} W +- {:.1e}  {:>8.3} %  {:+.2} standard errors\n",
+        "missing",
+        books.missing.watts,
+        books.missing.error,
+        100.0 * books.missing.watts / total,
+        books.z()
+    );
+    text
+}
+
+/// The same as JSON, watts.
+pub fn audit_as_json(scene: &Scene, books: &EnergyAudit) -> Value {
+    let power = |p: &Power| json!({ "watts": p.watts, "error": p.error });
+    let materials: serde_json::Map<_, _> =
+        books.by_material.iter().map(|(id, p)| (format!("{} {}", id.0, scene.material_name(*id)), power(p))).collect();
+    json!({
+        "particles": books.paths,
+        "emitted": power(&books.emitted),
+        "emitted_by_formula": books.emitted_by_formula,
+        "absorbed": power(&books.absorbed),
+        "absorbed_by_material": materials,
+        "escaped": power(&books.escaped),
+        "cut_off": power(&books.cut_off),
+        "missing": power(&books.missing),
+        "missing_in_standard_errors": books.z(),
+        "ended_by_roulette": books.ended_by_roulette,
+        "mean_events": books.mean_events,
+    })
 }

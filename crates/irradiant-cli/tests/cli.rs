@@ -256,6 +256,67 @@ fn probe_draws_and_speaks_json() {
 }
 
 #[test]
+fn light_at_a_point_and_the_rendering_equation_are_measured() {
+    let folder = Folder::new("light");
+    let flags = ["--resolution", "16x16", "--pixel", "8,12", "--side", "6", "--rays", "4"];
+    let output = folder.run(&[&["probe", "--incident", "light.exr", "--json"], &flags[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert!(value["scattered"]["rgb"][1].as_f64().is_some_and(|x| x > 0.0), "{value}");
+    assert!(value["path_traced"]["error"][1].as_f64().is_some_and(|x| x > 0.0), "{value}");
+    assert!(folder.0.join("light.exr").exists());
+    let png = folder.run(&[&["probe", "--incident", "light.png"], &flags[..]].concat());
+    assert_eq!(code(&png), 2, "{}", stderr(&png));
+    let output = folder.run(&["probe", "--residual", "4", "--rays", "8"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("standard error"), "{}", stdout(&output));
+    // Paths need a pixel.
+    assert_eq!(code(&folder.run(&["probe"])), 2);
+}
+
+#[test]
+fn the_books_of_energy_are_printed_and_kept() {
+    let folder = Folder::new("audit");
+    let output =
+        folder.run(&[&["render", "-q", "-o", "a.exr", "--audit=2000", "--stats", "s.json"], &SMALL[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    for word in ["emitted", "absorbed", "by red", "escaped", "missing"] {
+        assert!(stdout(&output).contains(word), "{word} is missing in {}", stdout(&output));
+    }
+    let text = std::fs::read(folder.0.join("s.json")).expect("written");
+    let value: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+    let watts = |side: &str| value["audit"][side]["watts"].as_f64().expect("a number");
+    let sides = watts("absorbed") + watts("escaped") + watts("cut_off") + watts("missing");
+    assert!((sides / watts("emitted") - 1.0).abs() < 1e-9, "{value}");
+    // The picture is the same as without.
+    folder.run(&[&["render", "-q", "-o", "b.exr"], &SMALL[..]].concat());
+    let read = |name: &str| std::fs::read(folder.0.join(name)).expect("written");
+    assert_eq!(read("a.exr"), read("b.exr"));
+}
+
+#[test]
+fn ways_of_leaving_a_surface_are_labelled() {
+    let folder = Folder::new("leaving");
+    let render = |mode: &str, name: &str| {
+        folder.run(&[&["render", "-o", name, "--self-intersection", mode], &SMALL[..]].concat())
+    };
+    for (mode, label) in [
+        ("none", "biased: self-intersection none"),
+        ("epsilon=0.5", "self-intersection epsilon=0.5"),
+        ("robust", "unbiased"),
+    ] {
+        let output = render(mode, "a.exr");
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        assert!(stderr(&output).contains(label), "{mode}: {}", stderr(&output));
+    }
+    for bad in ["epsilon", "none=1", "magic", "epsilon=-1"] {
+        assert_eq!(code(&render(bad, "a.exr")), 2, "{bad}");
+    }
+    let both = folder.run(&["render", "--self-intersection", "none", "--integrator", "path"]);
+    assert_eq!(code(&both), 2);
+}
+
+#[test]
 fn check_tells_what_a_scene_holds() {
     let folder = Folder::new("check");
     folder.write("s.pbrt", SCENE);

@@ -25,6 +25,7 @@ pub mod random_walk;
 pub mod record;
 pub mod registry;
 pub mod schedule;
+pub mod self_intersection;
 pub mod session;
 pub mod simple_path;
 pub mod truncation;

@@ -126,17 +126,17 @@ impl Job {
         &self.integrator
     }
 
+    /// Scattering events at most; `None`: no limit.
+    pub fn max_depth(&self) -> Option<u32> {
+        self.max_depth
+    }
+
     /// The path integrator that replays samples, if this job uses it.
     pub fn path_integrator(&self) -> Option<PathIntegrator> {
         (self.integrator.name() == "path").then(|| PathIntegrator {
             max_depth: self.max_depth,
             regularize: self.integrator.options().flag("regularize"),
         })
-    }
-
-    /// Scattering events at most.
-    pub fn max_depth(&self) -> Option<u32> {
-        self.max_depth
     }
 
     /// What the depth limit leaves out, estimated from a few paths without limit (a sixteenth of the picture's, 16384 at most);

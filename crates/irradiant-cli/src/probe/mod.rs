@@ -1,6 +1,7 @@
 //! `irradiant probe`: samples replayed, their paths printed, drawn and accounted for.
 
 mod json;
+mod light;
 mod print;
 
 use crate::exit::Exit;
@@ -19,8 +20,8 @@ pub struct ProbeArguments {
     /// Scene file [default: the built-in Cornell box]
     scene: Option<PathBuf>,
     /// Pixel: column, row
-    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, allow_hyphen_values = true)]
-    pixel: Pixel,
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, allow_hyphen_values = true, required_unless_present = "residual")]
+    pixel: Option<Pixel>,
     /// Which of the pixel's samples
     #[arg(long, value_name = "I", default_value_t = 0)]
     sample: u32,
@@ -36,6 +37,19 @@ pub struct ProbeArguments {
     /// Draw the paths: over the picture, and in the scene from outside and above (.svg)
     #[arg(short, long, value_name = "FILE.svg")]
     output: Option<PathBuf>,
+    /// Instead of paths: a picture of the light that arrives at the surface in the middle of the pixel, and whether what
+    /// it scatters is what the path tracer says
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sample", "paths", "bounces", "output", "residual"])]
+    incident: Option<PathBuf>,
+    /// Side of that picture, pixels
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    side: u32,
+    /// Instead of paths: test the rendering equation at so many random points
+    #[arg(long, value_name = "POINTS", conflicts_with_all = ["pixel", "sample", "paths", "bounces", "output"], value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    residual: Option<u32>,
+    /// Paths for each pixel of the picture of --incident (64), or for each side of each equation of --residual (4096)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    rays: Option<u32>,
     #[command(flatten)]
     pub picture: PictureOptions,
 }
@@ -83,9 +97,18 @@ fn probe(arguments: &ProbeArguments) -> Result<(), Error> {
     }
     let job = Job::new(&file, &arguments.picture.settings())?;
     let scene = &job.scene;
-    let Pixel(pixel) = arguments.pixel;
-    check_sample(&job, pixel, arguments.sample, arguments.paths)?;
     let integrator = path_integrator(&job)?;
+    if let Some(points) = arguments.residual {
+        light::residual(&job, &integrator, &file.name, points, arguments.rays.unwrap_or(4096), arguments.json);
+        return Ok(());
+    }
+    // One of the two is there: clap sees to it.
+    let Some(Pixel(pixel)) = arguments.pixel else { return Ok(()) };
+    check_sample(&job, pixel, arguments.sample, arguments.paths)?;
+    if let Some(path) = &arguments.incident {
+        let rays = arguments.rays.unwrap_or(64);
+        return light::incident(&job, &integrator, &file.name, pixel, path, arguments.side, rays, arguments.json);
+    }
     let stories: Vec<PathStory> = (arguments.sample..arguments.sample + arguments.paths)
         .filter_map(|sample| replay(scene, &integrator, pixel, sample))
         .collect();

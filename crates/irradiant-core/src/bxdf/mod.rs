@@ -6,7 +6,7 @@
 //! In reading order: [`fresnel`] and [`microfacet`] (interfaces), [`diffuse`], [`conductor`], [`dielectric`] (the simple
 //! models), [`coat`] (what a clear coat does to a diffuse base), `layers` (the random walk between a coat and any
 //! base), [`coated`] (coated diffuse and conductor), [`glossy_paint`], [`retroreflective`], [`thin_film_paint`] (models
-//! of our own), `spread` (what counts as glossy).
+//! of our own), `spread` (what counts as glossy), [`lobe_view`] (any model's lobes as numbers to plot).
 //!
 //! Contract, tested over every model at the end of this folder (`tests.rs`): values and densities are finite and
 //! non-negative for all directions, 0 where `wo.z` or `wi.z` is 0; `f` has no cosine; energy is at most 1; what
@@ -25,6 +25,7 @@ pub mod diffuse;
 pub mod coat;
 pub mod coated;
 mod layers;
+pub mod lobe_view;
 mod spread;
 
 pub mod glossy_paint;

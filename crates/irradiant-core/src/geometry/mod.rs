@@ -3,7 +3,8 @@
 //! # Layout
 //! In reading order: this file (what a ray may ask: [`Geometry`]); `compile` (from the description); `accel` (groups,
 //! trees, alpha); `instance` (groups placed elsewhere, moving or not); the shapes `triangle`, `bilinear`, `sphere`,
-//! `disk`, `cylinder`, `curve`; `placement` (quadrics' own spaces); [`emitter`] (shapes as sources of light).
+//! `disk`, `cylinder`, `curve`; `placement` (quadrics' own spaces); [`emitter`] (shapes as sources of light); [`textbook`]
+//! (how not to do it, for teaching).
 //!
 //! # Robustness
 //! No epsilon is anyone's to choose. Hit points are put back on their surface (quadrics on the quadric in `f64`,
@@ -26,6 +27,7 @@ mod spawn;
 mod sphere;
 #[cfg(test)]
 mod tests;
+pub mod textbook;
 mod triangle;
 
 pub use accel::Alpha;

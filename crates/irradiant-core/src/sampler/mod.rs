@@ -17,6 +17,7 @@ use irradiant_math::sequence::{
     sobol_64,
 };
 use irradiant_scene::desc::{Randomization, SamplerKind};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 /// The camera's numbers, each in [0, 1).
@@ -89,11 +90,54 @@ pub struct Sampler {
 #[derive(Clone, Copy, Debug)]
 pub struct SampleStream<'a> {
     sampler: &'a Sampler,
-    source: Source,
+    source: Source<'a>,
+}
+
+/// Which blocks of numbers a sample asked for, in order: for auditing integrators.
+#[derive(Debug, Default)]
+pub struct DrawLog(RefCell<Vec<u32>>);
+
+impl DrawLog {
+    /// The blocks, in the order in which they were asked for.
+    pub fn blocks(&self) -> Vec<u32> {
+        self.0.borrow().clone()
+    }
+}
+
+/// What a block of numbers is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DrawKind {
+    /// Film, wavelengths, time.
+    Camera,
+    /// The place on the lens.
+    Lens,
+    /// Light sampling at the vertex after so many scattering events.
+    Light(u32),
+    /// Scattering there, and the roulette that follows.
+    Scatter(u32),
+    /// Choices among mixed materials there.
+    Mix(u32),
+}
+
+impl DrawKind {
+    /// What the block of a number is for.
+    pub fn of(block: u32) -> Self {
+        let Some(vertex) = block.checked_sub(CAMERA_BLOCKS) else {
+            return if block == 0 { Self::Camera } else { Self::Lens };
+        };
+        let depth = vertex / BLOCKS_PER_VERTEX;
+        match vertex % BLOCKS_PER_VERTEX {
+            0 => Self::Light(depth),
+            1 => Self::Scatter(depth),
+            _ => Self::Mix(depth),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Source {
+enum Source<'a> {
+    /// Hashes of this and the block; written down.
+    Logged { key: u64, log: &'a DrawLog },
     /// Hashes of this and the block.
     Independent { key: u64 },
     /// Point `index` of a scrambled Sobol sequence whose seed is mixed with the block.
@@ -210,6 +254,13 @@ impl Sampler {
     }
 }
 
+impl<'a> SampleStream<'a> {
+    /// Independent numbers of a sample, whose blocks are written down as they are asked for.
+    pub fn logged(sampler: &'a Sampler, key: u64, log: &'a DrawLog) -> Self {
+        Self { sampler, source: Source::Logged { key, log } }
+    }
+}
+
 impl SampleStream<'_> {
     /// The camera's numbers.
     #[inline]
@@ -318,6 +369,10 @@ impl SampleStream<'_> {
     fn other_block(&self, block: u32) -> [f32; 4] {
         match self.source {
             Source::Padded { .. } => unreachable!("handled by the caller"),
+            Source::Logged { key, log } => {
+                log.0.borrow_mut().push(block);
+                SampleStream { source: Source::Independent { key }, ..*self }.other_block(block)
+            }
             Source::Independent { key } => {
                 let (a, b) = (hash2(key, 2 * block as u64), hash2(key, 2 * block as u64 + 1));
                 [a as u32, (a >> 32) as u32, b as u32, (b >> 32) as u32].map(unit_f32)

@@ -190,6 +190,7 @@ mod tests {
             world_from_light: MotionDesc::default(),
             scale: Spanned::unplaced(1.0),
             color_space: ColorSpaceName::Srgb,
+            group: None,
             span: Span::NONE,
         };
         let desc = SceneDesc { lights: intensities.iter().map(light).collect(), ..SceneDesc::default() };

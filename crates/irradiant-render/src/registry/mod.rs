@@ -29,6 +29,7 @@ pub const INTEGRATORS: &[IntegratorEntry] = &[
     crate::lectures::distribution::ENTRY,
     crate::lectures::per_length::ENTRY,
     crate::lectures::iterative::ENTRY,
+    crate::self_intersection::ENTRY,
 ];
 
 /// An integrator that can be asked for by name.
