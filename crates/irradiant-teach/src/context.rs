@@ -4,6 +4,8 @@ use crate::estimate::{Estimator, Production};
 use crate::row::{Fault, Measure, Outcome, Row, Verdict};
 use crate::walk::{Walk, Wrong};
 use irradiant::core::scene::Scene;
+use irradiant::renderer::Integrator;
+use irradiant::renderer::registry::IntegratorChoice;
 use irradiant::{ColorMode, Error, Job, MaxDepth, RenderSettings, Rendering, SceneFile, load_text, render};
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -201,6 +203,20 @@ impl Context<'_> {
         let mut settings = self.settings(setup);
         change(&mut settings);
         render(&self.file(name, text)?, &settings)
+    }
+
+    /// An integrator of the program by name, with options; `None` where this build has none of that name.
+    pub fn integrator(
+        &self,
+        name: &str,
+        options: &[(&str, &str)],
+        max_depth: Option<u32>,
+    ) -> Result<Option<Box<dyn Integrator>>, Error> {
+        let Ok(mut choice) = IntegratorChoice::named(name) else { return Ok(None) };
+        for (key, value) in options {
+            choice = choice.with(key, value).map_err(|why| Error::Settings(why.to_string()))?;
+        }
+        Ok(Some(choice.integrator(max_depth)))
     }
 
     /// What several rows need, made by the first that asks.

@@ -4,7 +4,9 @@
 //! bounces, by technique, by the kinds of scattering on the way.
 
 use irradiant::core::bxdf::Lobe;
+use cpu_time::ThreadTime;
 use irradiant::core::camera::CameraRay;
+use irradiant::core::film::{DevelopOptions, FilmTile};
 use irradiant::core::interaction::LightId;
 use irradiant::core::sampler::SampleStream;
 use irradiant::core::scene::Scene;
@@ -13,7 +15,7 @@ use irradiant::math::Ray;
 use irradiant::renderer::camera_samples::camera_sample;
 use irradiant::renderer::path::PathIntegrator;
 use irradiant::renderer::record::{Contribution, PathRecorder, Scattering, Technique};
-use irradiant::renderer::{Integrator, RenderStats};
+use irradiant::renderer::{Integrator, RenderStats, WorkUnit};
 use irradiant::spectrum::{SampledSpectrum, Wavelengths};
 use irradiant_testkit::Mean;
 
@@ -218,23 +220,28 @@ pub fn whole(scene: &Scene, estimator: &dyn Estimator, spp: u32) -> Estimate {
     take_apart(scene, estimator, spp, 0, &|_| None).remove(0)
 }
 
-/// The picture by any of the program's integrators, with the film's own variances.
-pub fn by_integrator(scene: &Scene, integrator: &dyn Integrator, spp: u32) -> Estimate {
-    use irradiant::core::film::FilmTile;
-    use irradiant::renderer::WorkUnit;
+/// The picture by any of the program's integrators: what the film develops, with its pixels' own variances (which lack light
+/// that lands in other pixels than its sample's), and this thread's CPU seconds.
+pub fn by_integrator(scene: &Scene, integrator: &dyn Integrator, spp: u32) -> (Estimate, f64) {
     let bounds = scene.bounds();
+    let start = ThreadTime::now();
+    let mut film = scene.new_film();
     let mut tile = FilmTile::new(bounds, scene.layers.channels());
     let mut stats = RenderStats::default();
     integrator.render(scene, &WorkUnit { bounds, samples: 0..spp }, &mut tile, &mut stats);
+    film.merge_tile(&tile);
+    let seconds = start.elapsed().as_secs_f64();
+    let image = film.develop(DevelopOptions::default());
     let mut estimate = Estimate { width: bounds.width(), spp, stats, ..Estimate::default() };
     for y in bounds.y0..bounds.y1 {
         for x in bounds.x0..bounds.x1 {
-            let pixel = tile.pixel(x, y);
-            estimate.mean.push(pixel.mean());
+            let (u, v) = ((x - bounds.x0) as usize, (y - bounds.y0) as usize);
+            estimate.mean.push(std::array::from_fn(|c| f64::from(image.get(u, v, c))));
+            let pixel = film.pixel(x, y);
             estimate.variance.push(pixel.variance().map(|v| v / f64::from(pixel.count.max(1))));
         }
     }
-    estimate
+    (estimate, seconds)
 }
 
 /// One sample of what a ray of one's own sees, and the parts of it by bounces in `by_bounce` (added).

@@ -1,5 +1,6 @@
 //! The rows of both lectures, by topic, and the faults that show that their checks bite.
 
+mod hard_paths;
 mod lecture_a;
 mod lecture_b;
 mod shared;

@@ -97,8 +97,8 @@ fn three_choices(c: &Context) -> Result<Outcome, Error> {
     sheet.agree("uniform directions", &run(&UNIFORM, c.spp(8192))?, &production, 0.03);
     sheet.agree("directions by the BRDF", &run(&BRDF, c.spp(4096))?, &production, 0.03);
     sheet.agree("light samples", &run(&LIGHTS, c.spp(4096))?, &production, 0.03);
-    for strategy in ["uniform", "brdf", "lights"] {
-        sheet.command(c.command("three-choices", &format!("--integrator direct --estimator strategy={strategy}")));
+    for strategy in ["uniform", "bsdf", "lights"] {
+        sheet.command(c.command("three-choices", &format!("--integrator direct --estimator technique={strategy}")));
     }
     Ok(sheet.finish())
 }
@@ -152,7 +152,7 @@ fn hemisphere_against_light(c: &Context) -> Result<Outcome, Error> {
         &strip(&[&picture(&UNIFORM)?, &picture(&LIGHTS)?]),
         0.0,
     );
-    sheet.command(c.command("cornell-box", "--spp 4 --integrator direct --estimator strategy=uniform"));
+    sheet.command(c.command("cornell-box", "--spp 4 --integrator direct --estimator technique=uniform"));
     Ok(sheet.finish())
 }
 
@@ -173,7 +173,7 @@ fn sample_uniform(c: &Context) -> Result<Outcome, Error> {
     closed_form(c, &mut sheet, &UNIFORM, c.spp(4096), 0.03)?;
     let dark = point_light(c, &UNIFORM)?;
     sheet.at_most("under a point light: greatest pixel", dark.mean.iter().map(|p| p[1]).fold(0.0, f64::max), 0.0);
-    sheet.command(c.command("disk-lamp", "--integrator direct --estimator strategy=uniform"));
+    sheet.command(c.command("disk-lamp", "--integrator direct --estimator technique=uniform"));
     Ok(sheet.finish())
 }
 
@@ -196,7 +196,7 @@ fn sample_brdf(c: &Context) -> Result<Outcome, Error> {
     let worst = by_brdf.mean.iter().map(|p| (p[1] / 1.6 - 1.0).abs()).fold(0.0, f64::max);
     sheet.at_most("a lamp in a mirror: worst pixel against F L (relative)", worst, 1e-4);
     sheet.at_most("the same by light samples alone (0: the expected failure)", run(&LIGHTS)?.grey(), 0.0);
-    sheet.command(c.command("mirror-lamp", "--integrator direct --estimator strategy=brdf"));
+    sheet.command(c.command("mirror-lamp", "--integrator direct --estimator technique=bsdf"));
     Ok(sheet.finish())
 }
 
@@ -205,7 +205,7 @@ fn sample_lights(c: &Context) -> Result<Outcome, Error> {
     closed_form(c, &mut sheet, &LIGHTS, c.spp(4096), 0.03)?;
     let e = point_light(c, &LIGHTS)?;
     sheet.close("point light: I cos / d^2 rho / pi", e.grey(), 2.0 * 0.8 / 25.0 * 0.5 / std::f64::consts::PI, 1e-5);
-    sheet.command(c.command("point-light", "--integrator direct --estimator strategy=lights"));
+    sheet.command(c.command("point-light", "--integrator direct --estimator technique=lights"));
     Ok(sheet.finish())
 }
 

@@ -82,7 +82,7 @@ fn all_lights(c: &Context) -> Result<Outcome, Error> {
     let rays = |e: &Estimate| e.stats.shadow_rays as f64 / e.stats.paths as f64;
     sheet.between("shadow rays a path over 4 M + 2, M = 1", rays(&one) / 6.0, [0.85, 1.0]);
     sheet.between("shadow rays a path, M = 4 over M = 1, of 18 / 6", rays(&four) / rays(&one) / 3.0, [0.98, 1.02]);
-    sheet.command(c.command("six-lights", "--integrator pathtracing --estimator lights=all --estimator samples=4"));
+    sheet.command(c.command("six-lights", "--integrator partitioned --estimator emission=specular --estimator lights=all --estimator samples=4"));
     Ok(sheet.finish())
 }
 

@@ -34,7 +34,7 @@ pub const ROWS: &[Row] = &[
         name: "Remedy 1: double instead of float",
         says: "53 instead of 24 bits, for more memory.",
         check: "Geometry in f64: self-shadows, memory and time against f32.",
-        run: |_| Ok(Outcome::waits("geometry in f64 is not a mode of the renderer yet")),
+        run: double_precision,
     },
     Row {
         id: "A66",
@@ -205,6 +205,32 @@ fn acne(c: &Context) -> Result<Outcome, Error> {
         &super::super::shared::strip(&[&noisy, &clean]),
         0.0,
     );
+    Ok(sheet.finish())
+}
+
+fn double_precision(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let spp = c.spp(16);
+    let text = body(1.0, 0.0, BALL, 48);
+    let run = |leaving: &str| -> Result<Option<(crate::estimate::Estimate, f64)>, Error> {
+        let Some(integrator) = c.integrator("selfintersection", &[("leaving", leaving)], Some(1))? else {
+            return Ok(None);
+        };
+        let scene = c.scene("body", &text, Setup::square(48, spp))?;
+        Ok(Some(crate::estimate::by_integrator(&scene, &*integrator, spp)))
+    };
+    let (Some((naive, _)), Some((single, robust_time)), Some((double, time))) =
+        (run("none")?, run("robust")?, run("fp64")?)
+    else {
+        return Ok(Outcome::waits("geometry in f64 is not a mode of this build"));
+    };
+    sheet.at_most("f32 without remedy: brightness over that by error bounds (self-shadows)", naive.grey() / single.grey(), 0.97);
+    sheet.agree("f64, and f32 with error bounds", &double, &single, 0.05);
+    sheet.note(format!(
+        "The f64 mode took {:.1} times the CPU seconds of the robust one here; its points take 24 bytes instead of 12.",
+        time / robust_time
+    ));
+    sheet.command(c.command("body", "--integrator selfintersection --estimator leaving=fp64"));
     Ok(sheet.finish())
 }
 

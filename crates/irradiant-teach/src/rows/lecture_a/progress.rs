@@ -1,5 +1,6 @@
 //! Samples, speed, hard scenes, and the whole progression (A08, A56, A57, A69 to A73).
 
+use super::super::hard_paths;
 use super::super::shared::{cornell_by_bounce, strip};
 use crate::context::{Budget, Context, Setup};
 use crate::estimate::{Estimate, Estimator, Production, whole};
@@ -57,7 +58,7 @@ pub const ROWS: &[Row] = &[
         name: "A challenging scene, 1000 paths a pixel: why?",
         says: "Caustics are nearly unsampleable.",
         check: "A caustic-aware mode against the path tracer at equal time.",
-        run: |_| Ok(Outcome::waits("no caustic-aware mode in this build")),
+        run: hard_paths::challenging,
     },
     Row {
         id: "A72",
@@ -365,7 +366,7 @@ fn progression(c: &Context) -> Result<Outcome, Error> {
         noise(&path)
     );
     sheet.picture("A73-progression", &caption, &strip(&images.iter().collect::<Vec<_>>()), 0.0);
-    for name in ["try1", "try2", "pathtracing"] {
+    for name in ["try1", "try2", "partitioned"] {
         sheet.command(c.command("cornell-box", &format!("--integrator {name} --spp 32")));
     }
     Ok(sheet.finish())

@@ -128,7 +128,7 @@ fn policies(c: &Context) -> Result<Outcome, Error> {
     sheet.at_least("efficiency of throughput roulette over none", throughput / none, 1.0);
     sheet.note("Efficiency-aware (adjoint-driven) roulette needs a guess of the solution, which comes with path guiding; it is not built yet.");
     sheet.command(
-        c.command("cornell-box", "--integrator pathtracing --estimator roulette=throughput --stats stats.json"),
+        c.command("cornell-box", "--integrator partitioned --estimator emission=specular --estimator roulette=throughput --stats stats.json"),
     );
     Ok(sheet.finish())
 }
@@ -198,7 +198,7 @@ fn overview(c: &Context) -> Result<Outcome, Error> {
     sheet.agree("the witness after the slide", &run(&Walk::PATH)?, &production, 0.05);
     let simple = SimplePathIntegrator { max_depth: None, sample_lights: true, sample_bsdf: true };
     let scene = c.scene("lit-box", &scenes::lit_box(8), Setup::square(8, spp))?;
-    let simple = crate::estimate::by_integrator(&scene, &simple, spp);
+    let simple = crate::estimate::by_integrator(&scene, &simple, spp).0;
     sheet.agree("the program's simplepath", &simple, &production, 0.05);
     // One light sample at each non-specular vertex, one BSDF sample: as many shadow rays as vertices, at most.
     let per_event = simple.stats.shadow_rays as f64 / (simple.stats.scatterings + simple.stats.paths) as f64;
@@ -277,6 +277,6 @@ fn pseudo_code(c: &Context) -> Result<Outcome, Error> {
         0.0,
     );
     sheet.note("Three gaps of the pseudo-code: no test for a miss, the next ray is traced before the roulette, and light by way of mirrors is lost. The witness has the first two mended, or it would not run.");
-    sheet.command(c.command("lamp-in-a-mirror", "--integrator pathtracing --estimator emission=eye"));
+    sheet.command(c.command("lamp-in-a-mirror", "--integrator partitioned"));
     Ok(sheet.finish())
 }

@@ -1,5 +1,6 @@
 //! Convergence, the good and the bad, notation, references (B10, B39 to B47).
 
+use super::super::hard_paths;
 use super::super::shared::{fit, strip};
 use crate::context::{Context, Setup};
 use crate::estimate::{Estimate, Production, whole};
@@ -16,9 +17,7 @@ pub const ROWS: &[Row] = &[
         name: "All rendering algorithms solve the rendering equation",
         says: "Kajiya's equation is the defining model.",
         check: "Path tracing, light tracing, bidirectional path tracing and photon mapping on one scene.",
-        run: |_| {
-            Ok(Outcome::waits("light tracing, bidirectional path tracing and photon mapping are not in this build"))
-        },
+        run: hard_paths::witnesses,
     },
     Row {
         id: "B39",
@@ -46,7 +45,7 @@ pub const ROWS: &[Row] = &[
         name: "And the bad: 10, 100, 1000 paths a pixel",
         says: "Caustics are noisy even at 1000.",
         check: "A metal ring and a glass ball under a small lamp at 10, 100 and 1000 paths, with plain path tracing and with a caustic-aware mode.",
-        run: |_| Ok(Outcome::waits("no caustic-aware mode in this build")),
+        run: hard_paths::the_bad,
     },
     Row {
         id: "B43",
@@ -82,7 +81,7 @@ pub const ROWS: &[Row] = &[
         name: "Next time: photon mapping",
         says: "-",
         check: "Progressive photon mapping: its difference to path tracing falls with its radius.",
-        run: |_| Ok(Outcome::waits("photon mapping is not in this build")),
+        run: hard_paths::photons,
     },
     Row {
         id: "B47",

@@ -167,7 +167,7 @@ fn distribution(c: &Context) -> Result<Outcome, Error> {
         efficiency(per_pixel, rays_here) / efficiency(one.sample_variance(), 4.0),
         0.9,
     );
-    sheet.command(c.command("lit-box", "--integrator distribution --max-depth 3"));
+    sheet.command(c.command("lit-box", "--integrator distribution --estimator rays=3 --max-depth 3"));
     Ok(sheet.finish())
 }
 
@@ -179,7 +179,7 @@ struct Diary {
 }
 
 impl PathRecorder for Diary {
-    fn vertex(&mut self, _: u32, at: &Interaction) {
+    fn vertex(&mut self, _: u32, at: &Interaction, _: &irradiant::core::bsdf::Bsdf) {
         self.vertices.push(*at);
     }
 
@@ -300,7 +300,7 @@ fn one_path_per_length(c: &Context) -> Result<Outcome, Error> {
     for k in 1..=4usize {
         sheet.agree(&format!("length {}: alone and reused", k + 2), &alone[k], &reused[k], 0.15);
     }
-    sheet.command(c.command("lit-box", "--integrator oneperlength --max-depth 4"));
+    sheet.command(c.command("lit-box", "--integrator perlength --max-depth 4"));
     Ok(sheet.finish())
 }
 
@@ -320,7 +320,7 @@ fn reuse(c: &Context) -> Result<Outcome, Error> {
     sheet.between("rays when reused, 8 over 4 bounces", points[2].2 / points[1].2, [1.6, 2.1]);
     let (alone, reused) = (per_length(c, 4, spp, false)?, per_length(c, 4, spp, true)?);
     sheet.agree("the same picture", &sum(&alone.0), &sum(&reused.0), 0.08);
-    sheet.command(c.command("lit-box", "--integrator pathtracing --max-depth 4"));
+    sheet.command(c.command("lit-box", "--integrator iterative --estimator emission=specular --max-depth 4"));
     Ok(sheet.finish())
 }
 
@@ -351,7 +351,7 @@ fn literal(c: &Context) -> Result<Outcome, Error> {
         production[0].grey() / production[2].grey(),
         0.01,
     );
-    sheet.command(c.command("lit-box", "--integrator bernpath"));
+    sheet.command(c.command("lit-box", "--integrator iterative"));
     Ok(sheet.finish())
 }
 
@@ -440,7 +440,7 @@ fn constant_roulette(c: &Context) -> Result<Outcome, Error> {
         -2.0,
     );
     sheet.note("Cornell's white is about 0.74 and the course's own boxes use 0.8: the recommendation does not work fine there. Roulette by throughput is the default.");
-    sheet.command(c.command("white-box", "--integrator pathtracing --estimator roulette=constant --estimator q=0.5"));
+    sheet.command(c.command("white-box", "--integrator partitioned --estimator emission=specular --estimator roulette=constant --estimator q=0.5"));
     Ok(sheet.finish())
 }
 

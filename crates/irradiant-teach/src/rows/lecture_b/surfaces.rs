@@ -1,5 +1,6 @@
 //! Mirrors, glass, emitting surfaces (B33 to B38).
 
+use super::super::hard_paths;
 use crate::context::{Context, Setup};
 use crate::estimate::{Estimate, Estimator, Production, whole};
 use crate::row::{Outcome, Row};
@@ -36,7 +37,7 @@ pub const ROWS: &[Row] = &[
         name: "Refractive objects produce a lot of noise",
         says: "In path tracing.",
         check: "Fireflies of a caustic (largest over median tile deviation), and how much caustic methods reduce them.",
-        run: |_| Ok(Outcome::waits("no caustic method in this build")),
+        run: hard_paths::refractive_noise,
     },
     Row {
         id: "B37",
@@ -91,7 +92,7 @@ fn glass(c: &Context) -> Result<Outcome, Error> {
         9.0 * 0.96 / 2.25,
         0.03,
     );
-    sheet.command(c.command("glass-ball", "--integrator pathtracing --estimator glass=constant"));
+    sheet.command(c.command("glass-ball", "--integrator partitioned --estimator emission=specular --estimator glass=constant"));
     Ok(sheet.finish())
 }
 
@@ -167,6 +168,6 @@ fn four_ways(c: &Context) -> Result<Outcome, Error> {
     let e = whole(&*c.scene("four-ways-diffuse", &cases[3].1, Setup::square(2, spp))?, &both, spp);
     sheet.close("without the rule, diffuse light over what it should be", e.grey() / cases[3].2, 2.0, 0.05);
     sheet.note(format!("Pane: its two interfaces reflect {} in all.", number(reflected)));
-    sheet.command(c.command("four-ways-diffuse", "--integrator pathtracing --estimator emission=everywhere"));
+    sheet.command(c.command("four-ways-diffuse", "--integrator partitioned --estimator emission=always"));
     Ok(sheet.finish())
 }
