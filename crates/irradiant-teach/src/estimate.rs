@@ -3,8 +3,8 @@
 //! An [`Estimator`] tells every contribution that it adds, so that one run gives the picture and any division of it: by
 //! bounces, by technique, by the kinds of scattering on the way.
 
-use irradiant::core::bxdf::Lobe;
 use cpu_time::ThreadTime;
+use irradiant::core::bxdf::Lobe;
 use irradiant::core::camera::CameraRay;
 use irradiant::core::film::{DevelopOptions, FilmTile};
 use irradiant::core::interaction::LightId;

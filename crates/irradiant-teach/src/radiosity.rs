@@ -115,6 +115,31 @@ fn cell(triangle: usize, u: f64, v: f64) -> usize {
     triangle * CELLS * CELLS + clamp(u) * CELLS + clamp(v)
 }
 
+/// The share of a cell's hemisphere that sees the lamp, the first quadrilateral, weighed by the cosine.
+fn lamp_share(quads: &[Quad], triangles: &[[V; 3]], t: usize, [i, j]: [usize; 2], n: u32, rng: &mut Rng) -> f64 {
+    let corners = triangles[t];
+    let (e1, e2) = (sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+    let lamp = cross(sub(triangles[0][1], triangles[0][0]), sub(triangles[0][2], triangles[0][0]));
+    let area = dot(lamp, lamp).sqrt();
+    let mut sum = 0.0;
+    for _ in 0..n {
+        let (mut u, mut v) = (rng.next_f64(), rng.next_f64());
+        if i + j == CELLS - 1 && u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        let (u, v) = ((i as f64 + u) / CELLS as f64, (j as f64 + v) / CELLS as f64);
+        let o = add(corners[0], add(scaled(e1, u), scaled(e2, v)));
+        let d = sub(point_on(&quads[0], rng), o);
+        let d2 = dot(d, d);
+        let w = scaled(d, 1.0 / d2.sqrt());
+        let (here, there) = (dot(quads[t / 2].n, w), -dot(quads[0].n, w));
+        if here > 0.0 && there > 0.0 && hit(triangles, o, w, t / 2).is_some_and(|(met, _, _)| met < 2) {
+            sum += here * there * area / (std::f64::consts::PI * d2);
+        }
+    }
+    sum / f64::from(n)
+}
+
 /// Form factors of all cells by `rays` cosine-distributed rays each.
 pub fn exchange(quads: &[Quad], rays: u32, seed: u64) -> Exchange {
     let triangles = triangles(quads);
@@ -150,7 +175,11 @@ pub fn exchange(quads: &[Quad], rays: u32, seed: u64) -> Exchange {
                         *counts.entry(cell(met, u, v)).or_insert(0u32) += 1;
                     }
                 }
+                // The lamp is small: what comes from it is counted by points on it instead, each asked whether it is seen.
+                counts.retain(|cell: &usize, _| *cell >= 2 * CELLS * CELLS);
+                let from_lamp = if t / 2 == 0 { 0.0 } else { lamp_share(quads, &triangles, t, [i, j], rays, &mut rng) };
                 exchange.rows[k] = counts.into_iter().map(|(k, n)| (k, f64::from(n) / f64::from(rays))).collect();
+                exchange.rows[k].push((0, from_lamp));
             }
         }
     }

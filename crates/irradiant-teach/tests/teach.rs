@@ -35,7 +35,8 @@ fn settings(folder: &Folder, only: &[&str], fault: Option<&str>) -> Settings {
 #[test]
 fn every_row_of_both_lectures_is_there_once() {
     let ids: Vec<&str> = rows().iter().map(|r| r.id).collect();
-    let expected: Vec<String> = (1..=73).map(|i| format!("A{i:02}")).chain((1..=47).map(|i| format!("B{i:02}"))).collect();
+    let expected: Vec<String> =
+        (1..=73).map(|i| format!("A{i:02}")).chain((1..=47).map(|i| format!("B{i:02}"))).collect();
     assert_eq!(ids, expected);
     for row in rows() {
         assert!(!row.name.is_empty() && !row.says.is_empty() && row.check.ends_with(['.', ')']), "{}", row.id);
@@ -83,7 +84,9 @@ fn unknown_rows_and_faults_are_refused() {
 
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path).flat_map(|d| ["chromium", "chromium-browser", "google-chrome"].map(|n| d.join(n))).find(|p| p.is_file())
+    std::env::split_paths(&path)
+        .flat_map(|d| ["chromium", "chromium-browser", "google-chrome"].map(|n| d.join(n)))
+        .find(|p| p.is_file())
 }
 
 /// The page as a browser has it after scripts ran, with a probe appended that writes what it found into the title.
@@ -124,10 +127,16 @@ fn the_page_shows_on_a_phone_with_all_its_pictures_and_links() {
     std::fs::write(&inner, html.replace("</body>", &format!("{probe}</body>"))).expect("writes");
     for width in [360, 1200] {
         let frame = folder.0.join(format!("frame-{width}.html"));
-        let outer = format!("<!doctype html><p id=r>nothing</p><iframe src=\"inner.html\" style=\"width:{width}px;height:800px;border:0\"></iframe><script>addEventListener('message',e=>{{document.getElementById('r').textContent=e.data}})</script>");
+        let outer = format!(
+            "<!doctype html><p id=r>nothing</p><iframe src=\"inner.html\" style=\"width:{width}px;height:800px;border:0\"></iframe><script>addEventListener('message',e=>{{document.getElementById('r').textContent=e.data}})</script>"
+        );
         std::fs::write(&frame, outer).expect("writes");
         let dom = browse(&frame, 1400).expect("chromium runs");
-        let found = dom.split("PROBE|").nth(1).and_then(|rest| rest.split('<').next()).unwrap_or_else(|| panic!("the probe did not answer:\n{}", &dom[..dom.len().min(2000)]));
+        let found = dom
+            .split("PROBE|")
+            .nth(1)
+            .and_then(|rest| rest.split('<').next())
+            .unwrap_or_else(|| panic!("the probe did not answer:\n{}", &dom[..dom.len().min(2000)]));
         let parts: Vec<&str> = found.split('|').collect();
         let number = |i: usize| parts[i].parse::<u32>().expect("a number");
         assert!(number(0) >= 2 && number(0) == number(1), "{} of {} pictures decode", parts[1], parts[0]);

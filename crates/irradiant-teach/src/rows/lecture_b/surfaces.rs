@@ -92,7 +92,9 @@ fn glass(c: &Context) -> Result<Outcome, Error> {
         9.0 * 0.96 / 2.25,
         0.03,
     );
-    sheet.command(c.command("glass-ball", "--integrator partitioned --estimator emission=specular --estimator glass=constant"));
+    sheet.command(
+        c.command("glass-ball", "--integrator partitioned --estimator emission=specular --estimator glass=constant"),
+    );
     Ok(sheet.finish())
 }
 
