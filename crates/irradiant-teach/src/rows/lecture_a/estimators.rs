@@ -132,7 +132,7 @@ fn hemisphere_against_light(c: &Context) -> Result<Outcome, Error> {
     let spp = c.spp(64);
     let size = c.side(48);
     let run = |walk: &Walk, spp: u32| -> Result<Estimate, Error> {
-        reflected(&*c.scene("cornell-box", &scenes::cornell(), Setup::square(size, spp))?, walk, spp)
+        Ok(reflected(&*c.scene("cornell-box", &scenes::cornell(), Setup::square(size, spp))?, walk, spp))
     };
     let (uniform, lights) = (run(&UNIFORM, 4 * spp)?, run(&LIGHTS, spp)?);
     // What the eye sees of the lamp itself has no variance in either.

@@ -248,7 +248,7 @@ fn neumann(c: &Context) -> Result<Outcome, Error> {
             let expected = rho.powi(i as i32);
             let (mean, se) = part.total()[1];
             // Terms that no path reached are below what would be seen; their own error bar is 0.
-            let se = se.max((expected / (16.0 * f64::from(spp))).sqrt() * rho.powi(i as i32 / 2));
+            let se = se.max((expected / (16.0 * f64::from(spp))).sqrt());
             let z = ((mean - expected).abs() - 1e-5 * expected).max(0.0) / se;
             if z > worst {
                 (worst, first) = (z, format!("K^{i}: {} for {}", number(mean), number(expected)));

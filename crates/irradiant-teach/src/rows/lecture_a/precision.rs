@@ -259,7 +259,7 @@ fn ignore_last(c: &Context) -> Result<Outcome, Error> {
     let Some(whole) = run(1, "robust")? else {
         return Ok(Outcome::waits("the remedies are not modes of this build"));
     };
-    let mut share = |n, leaving| -> Result<f64, Error> { Ok(run(n, leaving)?.unwrap_or(0.0) / whole) };
+    let share = |n, leaving| -> Result<f64, Error> { Ok(run(n, leaving)?.unwrap_or(0.0) / whole) };
     sheet.at_most("one floor, no remedy: light that is left", share(1, "none")?, 0.97);
     sheet.between("one floor, the last triangle ignored", share(1, "skip-id")?, [0.995, 1.005]);
     sheet.at_most("two floors in one place, the last triangle ignored", share(2, "skip-id")?, 0.97);
