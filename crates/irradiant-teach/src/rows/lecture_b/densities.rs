@@ -359,8 +359,11 @@ fn veach(c: &Context) -> Result<Outcome, Error> {
             let part = |e: &Estimate| e.region(|x, y| plate[y * w as usize + x] == Some(p));
             let (pl, pb, pm) = (part(&l), part(&b), part(&both));
             let (vl, vb, vm) = (pl.sample_variance(), pb.sample_variance(), pm.sample_variance());
-            // A technique that met nothing in so many samples has no say.
-            let says = |e: &Estimate, v: f64| v > 0.0 && e.grey() > 0.3 * pm.grey();
+            // A technique that met next to nothing in so many samples does not know its variance.
+            let says = |e: &Estimate, v: f64| {
+                let ((mean, se), (other, _)) = (e.total()[1], pm.total()[1]);
+                v > 0.0 && se < 0.2 * mean && (mean - other).abs() < 0.3 * other
+            };
             let candidates = [(vl, &pl), (vb, &pb)].into_iter().filter(|(v, e)| says(e, *v));
             let Some((best_variance, best)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
             let ratio = vm / best_variance;
