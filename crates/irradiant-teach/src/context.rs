@@ -61,7 +61,8 @@ impl Lesson {
                 Ok(Err(error)) => Outcome::fails(format!("{error}")),
                 Err(_) => Outcome::fails("it panicked"),
             };
-            outcome.commands.push(format!("irradiant teach --row {}", row.id));
+            let quick = if self.budget == Budget::Quick { "--quick " } else { "" };
+            outcome.commands.push(format!("irradiant teach {quick}--row {}", row.id));
             outcome.seconds = started.elapsed().as_secs_f64();
             outcome
         })

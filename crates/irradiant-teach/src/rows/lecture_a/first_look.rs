@@ -294,7 +294,7 @@ fn complex_lighting(c: &Context) -> Result<Outcome, Error> {
         "A06-sky",
         "The same ball under a sky with a sun.",
         &c.render("ball-sky", &sky(smooth_film(160)), setup)?.image(),
-        0.0,
+        -2.0,
     );
     sheet.command(c.command("ball-sky", "--spp 64"));
     Ok(sheet.finish())

@@ -405,7 +405,7 @@ fn gold(c: &Context) -> Result<Outcome, Error> {
         "A14-materials",
         "Mirror, diffuse, gold, plastic, red semi-gloss paint, lacquer, retroreflector.",
         &gallery.image(),
-        0.0,
+        0.8,
     );
     sheet.command(c.command("materials", "--spp 64"));
     Ok(sheet.finish())

@@ -398,7 +398,7 @@ fn veach(c: &Context) -> Result<Outcome, Error> {
         "B32-plates",
         "16 samples: by the BSDF; by the lights; both, weighed by the power heuristic.",
         &strip(&images.iter().collect::<Vec<_>>()),
-        0.3,
+        1.0,
     );
     sheet.command(c.command("veach-plates", "--spp 16"));
     Ok(sheet.finish())

@@ -380,7 +380,7 @@ fn radiance_probe(c: &Context) -> Result<Outcome, Error> {
         "B09-probe",
         "What a point of the floor sees: the hemisphere from above (green channel). The bright spot is the lamp.",
         &image,
-        0.0,
+        8.0,
     );
     Ok(sheet.finish())
 }

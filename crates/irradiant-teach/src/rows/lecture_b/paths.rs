@@ -435,7 +435,7 @@ fn constant_roulette(c: &Context) -> Result<Outcome, Error> {
         "B25-roulette",
         "A box of albedo 0.9, 32 samples: constant q = 0.5 and its few very heavy paths; roulette by throughput.",
         &super::super::shared::strip(&[&picture(constant)?, &picture(Roulette::Throughput)?]),
-        -2.0,
+        -3.5,
     );
     sheet.note("Cornell's white is about 0.74 and the course's own boxes use 0.8: the recommendation does not work fine there. Roulette by throughput is the default.");
     sheet.command(c.command(
