@@ -322,7 +322,7 @@ fn uniform_selector(c: &Context) -> Result<Outcome, Error> {
 fn veach(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
     let text = scenes::VEACH_PLATES;
-    let (w, h, spp) = (c.side(64), c.side(48), c.spp(128));
+    let (w, h, spp) = (48, 36, c.spp(320));
     let only = |lamp: usize| -> String {
         // All lamps but one are put out: their bodies stay.
         let mut kept = String::new();
