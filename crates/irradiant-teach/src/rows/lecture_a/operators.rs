@@ -367,7 +367,7 @@ fn additivity(c: &Context) -> Result<Outcome, Error> {
         worst,
         2e-6,
     );
-    sheet.command(c.command("two-balls", "--aov bounces"));
+    sheet.command(c.command("two-balls", "--aov bounces:6"));
     Ok(sheet.finish())
 }
 
@@ -411,7 +411,7 @@ fn k_images(c: &Context) -> Result<Outcome, Error> {
         &strip(&images.iter().collect::<Vec<_>>()),
         2.0,
     );
-    sheet.command(c.command("cornell-box", "--aov bounces"));
+    sheet.command(c.command("cornell-box", "--aov bounces:6"));
     Ok(sheet.finish())
 }
 

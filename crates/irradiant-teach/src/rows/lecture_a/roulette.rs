@@ -231,7 +231,7 @@ fn partition(c: &Context) -> Result<Outcome, Error> {
         &strip(&images.iter().collect::<Vec<_>>()),
         0.0,
     );
-    sheet.command(c.command("cornell-box", "--aov \"zero=LE\" --aov bounces"));
+    sheet.command(c.command("cornell-box", "--aov \"zero=LE\" --aov bounces:2"));
     Ok(sheet.finish())
 }
 

@@ -52,11 +52,7 @@ pub const ROWS: &[Row] = &[
         name: "Light transport notation",
         says: "L, D, S, E.",
         check: "Path expressions on the command line: a disjoint cover adds up to the picture.",
-        run: |_| {
-            Ok(Outcome::waits(
-                "path expressions are not in this build; A03 and A04 tell the layers apart by the paths' own story",
-            ))
-        },
+        run: path_expressions,
     },
     Row {
         id: "B44",
@@ -91,6 +87,60 @@ pub const ROWS: &[Row] = &[
         run: pbrt_scenes,
     },
 ];
+
+fn path_expressions(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let spp = c.spp(96);
+    let setup = Setup { size: Some([c.side(80), c.side(60)]), spp: Some(spp), ..Setup::default() };
+    let words = ["gi", "lde=LDE", "caustic=LS+DS*E", "classic=L(D|S)*E", "bounces:3"];
+    let aovs: Vec<irradiant::Aov> =
+        words.iter().map(|w| w.parse().map_err(Error::Settings)).collect::<Result<_, _>>()?;
+    let picture = c.render_with("two-balls", scenes::TWO_BALLS, setup, |s| s.aovs = aovs)?.image();
+    let layer = |name: &str| {
+        let names = ["R", "G", "B"].map(|c| format!("{name}.{c}"));
+        picture.select(&names.each_ref().map(String::as_str)).ok_or_else(|| Error::Internal(format!("no layer {name}")))
+    };
+    // Sums of layers against the picture, in units of the last place of its own values.
+    let mut cover = |what: &str, names: &[&str]| -> Result<(), Error> {
+        let layers: Vec<_> = names.iter().map(|n| layer(n)).collect::<Result<_, _>>()?;
+        let mut worst = 0.0f64;
+        for i in 0..picture.width() * picture.height() * 3 {
+            let (x, y, ch) = (i / 3 % picture.width(), i / 3 / picture.width(), i % 3);
+            let whole = f64::from(picture.get(x, y, ch));
+            let sum: f64 = layers.iter().map(|l| f64::from(l.get(x, y, ch))).sum();
+            worst = worst.max((sum - whole).abs() / (f64::from(f32::EPSILON) * whole.max(1e-30)));
+        }
+        sheet.at_most(&format!("{what}: worst pixel, units in the last place"), worst, names.len() as f64);
+        Ok(())
+    };
+    cover("direct, caustics, inter-reflections", &["direct", "caustics", "interreflections"])?;
+    cover("L(D|S)*E in a room without glossy things", &["classic"])?;
+    cover("K0 to K3 and the rest", &["K0", "K1", "K2", "K3", "Krest"])?;
+    // The caustics' layer against the paths' own story, from another run.
+    let apart = super::super::shared::balls_apart(c)?;
+    let caustic = layer("caustic")?;
+    let mean = caustic.average()[1];
+    let (expected, se) = apart[1].total()[1];
+    let z = (mean - expected).abs() / (2f64.sqrt() * se);
+    sheet.holds(
+        "LS+DS*E against the caustics of another run",
+        format!("{} and {}: {z:.2} standard errors", number(mean), number(expected)),
+        "4.9 standard errors",
+        &format!("a bias of {:.1} %", 690.0 * 2f64.sqrt() * se / expected),
+        z <= 4.9,
+    );
+    let images = [layer("lde")?, caustic, layer("classic")?];
+    sheet.picture(
+        "B43-expressions",
+        "LDE, LS+DS*E, L(D|S)*E: layers of one render.",
+        &strip(&images.iter().collect::<Vec<_>>()),
+        0.5,
+    );
+    sheet.command(
+        c.command("two-balls", "--aov lde=LDE --aov \"caustic=LS+DS*E\" --aov \"classic=L(D|S)*E\" -o two-balls.exr"),
+    );
+    Ok(sheet.finish())
+}
 
 fn kajiya(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
