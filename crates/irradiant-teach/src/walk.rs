@@ -97,7 +97,7 @@ pub enum Wrong {
     EmissionTwice,
     /// The chance of the light that was picked is left out.
     PickNotCounted,
-    /// Samples brighter than 1 are cut.
+    /// Contributions brighter than a limit (a little more than what the film shows as 1) are cut.
     Clamped,
     /// Rays leave from the rounded hit itself.
     NoOffset,
@@ -214,7 +214,8 @@ impl Estimator for Walk {
         let mut sum = SampledSpectrum::ZERO;
         let mut lobes: Vec<Lobe> = Vec::new();
         let mut add = |sum: &mut SampledSpectrum, bounces, radiance: SampledSpectrum, by_hit, light, lobes: &[Lobe]| {
-            let radiance = if self.wrong == Wrong::Clamped { radiance.min(SampledSpectrum::ONE) } else { radiance };
+            let radiance =
+                if self.wrong == Wrong::Clamped { radiance.min(SampledSpectrum::splat(0.012)) } else { radiance };
             *sum += radiance;
             tell(&Part { bounces, radiance, by_hit, light, lobes });
         };

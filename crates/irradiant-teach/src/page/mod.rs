@@ -3,6 +3,7 @@
 use crate::row::{Outcome, Picture, Verdict};
 use crate::rows::gaps;
 use crate::teach::{Lesson, Told};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// Bytes as base64 with padding (RFC 4648).
@@ -92,7 +93,7 @@ fn measures(outcome: &Outcome) -> String {
     html + "</div></details>\n"
 }
 
-fn row(told: &Told) -> String {
+fn row(told: &Told, here: &Here) -> String {
     let (row, outcome) = (&told.row, &told.outcome);
     let (class, label) = word(&outcome.verdict);
     let mut html = format!(
@@ -116,7 +117,7 @@ fn row(told: &Told) -> String {
     }
     html += &measures(outcome);
     for note in &outcome.notes {
-        let _ = write!(html, "<p class=\"note\">{}</p>\n", linked(note));
+        let _ = write!(html, "<p class=\"note\">{}</p>\n", linked(note, here));
     }
     if !outcome.commands.is_empty() {
         let lines: Vec<String> = outcome.commands.iter().map(|c| escaped(c)).collect();
@@ -125,14 +126,15 @@ fn row(told: &Told) -> String {
     html + "</article>\n"
 }
 
-/// Names of rows as links.
-fn linked(text: &str) -> String {
+/// The rows that are on the page.
+type Here<'a> = BTreeSet<&'a str>;
+
+/// Names of rows that are on the page as links.
+fn linked(text: &str, here: &Here) -> String {
     let mut out = String::new();
-    for (i, word) in escaped(text).split_inclusive(|c: char| !c.is_ascii_alphanumeric()).enumerate() {
+    for word in escaped(text).split_inclusive(|c: char| !c.is_ascii_alphanumeric()) {
         let name = word.trim_end_matches(|c: char| !c.is_ascii_alphanumeric());
-        let known = name.len() == 3 && crate::rows::rows().iter().any(|r| r.id == name);
-        let _ = i;
-        if known {
+        if here.contains(name) {
             let _ = write!(out, "<a href=\"#{name}\">{name}</a>{}", &word[name.len()..]);
         } else {
             out += word;
@@ -151,6 +153,7 @@ fn lecture(lesson: &Lesson, letter: char, title: &str, intro: &str) -> String {
         letter.to_ascii_lowercase()
     );
     let mut chapter = None;
+    let here: Here = lesson.told.iter().map(|t| t.row.id).collect();
     for t in told {
         let own = CHAPTERS.iter().rfind(|(first, _)| first.starts_with(letter) && *first <= t.row.id);
         if own.map(|c| c.0) != chapter {
@@ -159,7 +162,7 @@ fn lecture(lesson: &Lesson, letter: char, title: &str, intro: &str) -> String {
                 let _ = write!(html, "<h4 class=\"chapter\">{name}</h4>\n");
             }
         }
-        html += &row(t);
+        html += &row(t, &here);
     }
     html + "</section>\n"
 }
@@ -167,6 +170,7 @@ fn lecture(lesson: &Lesson, letter: char, title: &str, intro: &str) -> String {
 /// The page. Pictures of `hero` rows stand at its top.
 pub fn page(lesson: &Lesson) -> String {
     let (n, passed) = (lesson.told.len(), lesson.passed());
+    let here: Here = lesson.told.iter().map(|t| t.row.id).collect();
     let count = |class: &str| lesson.told.iter().filter(|t| word(&t.outcome.verdict).0 == class).count();
     let (fails, waits) = (count("fails"), count("waits"));
     let measures: usize = lesson.told.iter().map(|t| t.outcome.measures.len()).sum();
@@ -232,8 +236,7 @@ pub fn page(lesson: &Lesson) -> String {
     );
     html += "<section id=\"gaps\"><h2>Where the slides are wrong or incomplete</h2>\n<dl class=\"gaps\">";
     for (rows, what) in gaps() {
-        let _ =
-            write!(html, "<dt>{}</dt><dd>{}</dd>", if n > 100 { linked(rows) } else { escaped(rows) }, escaped(what));
+        let _ = write!(html, "<dt>{}</dt><dd>{}</dd>", linked(rows, &here), escaped(what));
     }
     html += "</dl></section>\n<section id=\"faults\"><h2>Faults on purpose</h2>\n<p class=\"intro\">Each makes its row fail: <code>irradiant teach --fault NAME</code>. A test holds this.</p><dl class=\"gaps\">";
     for fault in crate::faults() {
@@ -241,7 +244,7 @@ pub fn page(lesson: &Lesson) -> String {
             html,
             "<dt><code>{}</code> \u{2192} {}</dt><dd>{}</dd>",
             fault.name,
-            if n > 100 { linked(fault.row) } else { escaped(fault.row) },
+            linked(fault.row, &here),
             escaped(fault.what)
         );
     }
@@ -265,7 +268,8 @@ mod tests {
 
     #[test]
     fn names_of_rows_become_links_and_nothing_else_does() {
-        assert_eq!(linked("See A38, A99."), "See <a href=\"#A38\">A38</a>, A99.");
-        assert_eq!(linked("a < b"), "a &lt; b");
+        let here = Here::from(["A38"]);
+        assert_eq!(linked("See A38, A99.", &here), "See <a href=\"#A38\">A38</a>, A99.");
+        assert_eq!(linked("a < b", &here), "a &lt; b");
     }
 }

@@ -48,7 +48,7 @@ pub(crate) const FAULTS: &[(Fault, Wrong)] = &[
         "the right side of the rendering equation lacks Le at the next surface",
         Wrong::Nothing,
     ),
-    fault("samples-clamped", "A32", "contributions above 1 are cut", Wrong::Clamped),
+    fault("samples-clamped", "A32", "bright contributions are cut", Wrong::Clamped),
     fault("albedo-off", "A35", "the furnace reflects 1 % more than stated", Wrong::Nothing),
     fault("bounce-too-many", "A38", "depth-limited renders go one bounce too far", Wrong::DepthOffByOne),
     fault("depth-off-by-one", "A45", "the depth limit is off by one", Wrong::DepthOffByOne),
