@@ -8,6 +8,8 @@ use crate::say::say;
 pub enum Exit {
     /// Done.
     Ok = 0,
+    /// Something that was to be checked is not so.
+    Failed = 1,
     /// The command line is wrong (clap exits with 2 by itself; settings that only the scene can judge come here).
     Usage = 2,
     /// The scene or image is wrong.

@@ -12,6 +12,7 @@ mod progress;
 mod render;
 mod say;
 mod stats;
+mod teach;
 
 use clap::{Parser, Subcommand};
 use exit::Exit;
@@ -36,6 +37,7 @@ enum Command {
     Probe(probe::ProbeArguments),
     Image(image::ImageArguments),
     Integrators(integrators::IntegratorsArguments),
+    Teach(teach::TeachArguments),
 }
 
 fn main() -> ExitCode {
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         Command::Probe(a) => probe::run(&a),
         Command::Image(a) => image::run(&a),
         Command::Integrators(a) => integrators::run(&a),
+        Command::Teach(a) => teach::run(&a),
     };
     let exit = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or(Exit::Bug);
     ExitCode::from(exit as u8)

@@ -119,6 +119,10 @@ impl Coat {
     /// a rough one, energy that single scattering loses goes to the base. Reciprocal.
     pub fn lossless(eta: f32, alpha: f32) -> Self {
         let mut coat = Self::walked(eta, Ggx::new(alpha, alpha), 0.0, CoatWeights::Exact);
+        if coat.interface.is_specular() {
+            // Its mirror reflection is a delta, which tables of the rest know nothing of.
+            return Self::new(eta, Ggx::SMOOTH, 0.0, CoatWeights::Exact);
+        }
         coat.form = CoatForm::Tabulated;
         coat.enter = table(|i| (1.0 - coat.reflection(node(i), 4096)) as f32);
         coat.exit = coat.enter;

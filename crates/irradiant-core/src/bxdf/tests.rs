@@ -462,6 +462,9 @@ fn white_bodies_vanish_in_a_white_furnace() {
             assert!(mean.standard_error() < 4e-4);
         }
     }
+    // A smooth paint reflects by a delta, which evaluation does not see: by samples, above. It is the same model.
+    let smooth = GlossyPaint::new(&Coat::lossless(1.5, 0.0), s(1.0));
+    assert_eq!(smooth, GlossyPaint::new(&lossless, s(1.0)));
     // Our paint: by evaluation, quadrature-like, since its coat is rough. A loss of 1 % would be seen.
     for (eta, alpha) in [(1.5, 0.05), (1.5, 0.3), (1.7, 0.6), (1.5, 1.0)] {
         let paint = Bxdf::GlossyPaint(GlossyPaint::new(&Coat::lossless(eta, alpha), s(1.0)));

@@ -1,0 +1,261 @@
+//! Light that path tracing finds by chance only, and the independent algorithms that find it (A71, B10, B36, B42, B46).
+
+use super::shared::strip;
+use crate::context::{Context, Setup};
+use crate::estimate::{Estimate, by_integrator};
+use crate::row::Outcome;
+use crate::scenes;
+use crate::sheet::{Sheet, number};
+use irradiant::Error;
+use irradiant_testkit::Mean;
+
+const MISSING: &str = "light tracing, bidirectional path tracing and photon mapping are not in this build";
+
+/// Several renders by an integrator of the program, each with a seed of its own, and the CPU seconds of one.
+struct Runs {
+    pictures: Vec<Estimate>,
+    seconds: f64,
+}
+
+/// What is rendered, and how.
+struct Task<'a> {
+    scene: &'a str,
+    text: &'a str,
+    size: [u32; 2],
+    depth: Option<u32>,
+}
+
+fn runs(
+    c: &Context,
+    task: &Task,
+    name: &str,
+    options: &[(&str, &str)],
+    spp: u32,
+    n: u32,
+) -> Result<Option<Runs>, Error> {
+    let (mut pictures, mut seconds) = (vec![], 0.0);
+    for _ in 0..n {
+        let Some(integrator) = c.integrator(name, options, task.depth)? else { return Ok(None) };
+        let setup = Setup { size: Some(task.size), spp: Some(spp), ..Setup::default() };
+        let scene = c.scene(task.scene, task.text, setup)?;
+        let (picture, time) = by_integrator(&scene, &*integrator, spp);
+        pictures.push(picture);
+        seconds += time / f64::from(n);
+    }
+    Ok(Some(Runs { pictures, seconds }))
+}
+
+impl Runs {
+    /// The picture's mean and what it varies from run to run.
+    fn grey(&self) -> Mean {
+        let mut mean = Mean::new();
+        self.pictures.iter().for_each(|p| mean.add(p.grey()));
+        mean
+    }
+
+    /// The mean picture.
+    fn mean(&self) -> Estimate {
+        let mut sum = self.pictures[0].clone();
+        for p in &self.pictures[1..] {
+            sum = sum.plus(1.0, p);
+        }
+        let n = self.pictures.len() as f64;
+        sum.mean.iter_mut().for_each(|p| *p = p.map(|x| x / n));
+        sum
+    }
+
+    /// Relative squared error of one run: from run to run, over the square of a smoothed reference.
+    fn rel_mse(&self, reference: &Estimate) -> f64 {
+        let floor = 0.02 * reference.grey();
+        let mut sum = Mean::new();
+        for i in 0..reference.mean.len() {
+            let mut pixel = Mean::new();
+            self.pictures.iter().for_each(|p| pixel.add(p.mean[i][1]));
+            sum.add(pixel.variance() / (reference.mean[i][1].powi(2) + floor * floor));
+        }
+        sum.mean()
+    }
+
+    /// Largest and median deviation of tiles of 5 by 5 pixels from run to run, relative to the reference there.
+    fn fireflies(&self, reference: &Estimate) -> (f64, f64) {
+        let w = reference.width;
+        let (columns, rows) = (w / 5, reference.mean.len() / w / 5);
+        let mut tiles: Vec<f64> = (0..columns * rows)
+            .map(|t| {
+                let of = |p: &Estimate| -> f64 {
+                    (0..25).map(|i| p.mean[(t / columns * 5 + i / 5) * w + t % columns * 5 + i % 5][1]).sum()
+                };
+                let mut value = Mean::new();
+                self.pictures.iter().for_each(|p| value.add(of(p)));
+                value.variance().sqrt() / of(reference).max(1e-9)
+            })
+            .collect();
+        tiles.sort_by(f64::total_cmp);
+        (tiles[tiles.len() - 1], tiles[tiles.len() / 2].max(1e-12))
+    }
+}
+
+/// B10.
+pub fn witnesses(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let text = scenes::lit_box(16);
+    let task = Task { scene: "lit-box", text: &text, size: [16, 16], depth: None };
+    let spp = c.spp(96);
+    let Some(path) = runs(c, &task, "path", &[], spp, 12)? else { return Ok(Outcome::waits(MISSING)) };
+    for name in ["lighttrace", "bdpt"] {
+        let Some(other) = runs(c, &task, name, &[], spp, 12)? else { return Ok(Outcome::waits(MISSING)) };
+        sheet.means_agree(&format!("diffuse box, path and {name}"), &path.grey(), &other.grey(), 0.06);
+        sheet.command(c.command("lit-box", &format!("--integrator {name}")));
+    }
+    let Some(photon) = runs(c, &task, "photon", &[("radius", "0.05")], spp, 12)? else {
+        return Ok(Outcome::waits(MISSING));
+    };
+    let (a, b) = (path.grey(), photon.grey());
+    let se = a.standard_error().hypot(b.standard_error());
+    sheet.holds(
+        "diffuse box, path and photon mapping of radius 0.05 (biased by it)",
+        format!("{} and {}: {:+.2} %", number(a.mean()), number(b.mean()), 100.0 * (b.mean() / a.mean() - 1.0)),
+        "3 % and 4.9 standard errors",
+        &format!("{:.1} %", 100.0 * (0.03 + 6.9 * se / a.mean())),
+        (a.mean() - b.mean()).abs() <= 0.03 * a.mean() + 4.9 * se && se < 0.02 * a.mean(),
+    );
+    // A glass ball's caustic, where path and bidirectional tracing find light in different ways.
+    let caustic = scenes::RING_AND_GLASS.replace("radius\" 0.05", "radius\" 0.6").replace("3600 3320 2800", "25 23 19");
+    let task = Task { scene: "ring-and-glass-large-lamp", text: &caustic, size: [32, 24], depth: Some(8) };
+    let Some(path) = runs(c, &task, "path", &[], spp, 12)? else { return Ok(Outcome::waits(MISSING)) };
+    let Some(other) = runs(c, &task, "bdpt", &[], spp, 12)? else { return Ok(Outcome::waits(MISSING)) };
+    sheet.means_agree("ring and glass under a large lamp, path and bdpt", &path.grey(), &other.grey(), 0.08);
+    Ok(sheet.finish())
+}
+
+fn ring() -> Task<'static> {
+    Task { scene: "ring-and-glass", text: scenes::RING_AND_GLASS, size: [40, 30], depth: Some(8) }
+}
+
+/// A71.
+pub fn challenging(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let task = ring();
+    let reference_spp = c.spp(256);
+    let Some(reference) = runs(c, &task, "photon", &[], reference_spp, 2)? else {
+        return Ok(Outcome::waits(MISSING));
+    };
+    let reference = reference.mean();
+    let Some(path) = runs(c, &task, "path", &[], c.spp(96), 8)? else { return Ok(Outcome::waits(MISSING)) };
+    let cost = path.rel_mse(&reference) * path.seconds;
+    let mut best = 0.0f64;
+    for name in ["bdpt", "photon"] {
+        let Some(other) = runs(c, &task, name, &[], c.spp(32), 4)? else { return Ok(Outcome::waits(MISSING)) };
+        let gain = cost / (other.rel_mse(&reference) * other.seconds);
+        sheet.note(format!(
+            "{name}: relMSE x CPU seconds is {} times below the path tracer's ({} in {:.2} s against {} in {:.2} s).",
+            number(gain),
+            number(other.rel_mse(&reference)),
+            other.seconds,
+            number(path.rel_mse(&reference)),
+            path.seconds
+        ));
+        best = best.max(gain);
+    }
+    sheet.at_least("relMSE x time, path tracer over the best caustic-aware mode", best, 100.0);
+    // Why: no light sample finds what comes by way of the ring or the glass, and chance hardly ever does.
+    let setup = Setup { size: Some(task.size), spp: Some(c.spp(96)), ..Setup::default() };
+    let scene = c.scene(task.scene, task.text, setup)?;
+    let production = crate::estimate::Production { max_depth: Some(8) };
+    let classify = |p: &crate::estimate::Part| (!p.by_hit).then_some(0);
+    let sampled = crate::estimate::take_apart(&scene, &production, c.spp(96), 1, &classify).swap_remove(0);
+    let lost = 1.0 - sampled.grey() / reference.grey();
+    sheet.at_least("share of the light that no light sample finds", lost, 0.02);
+    sheet.command(c.command("ring-and-glass", "--integrator photon --spp 256"));
+    Ok(sheet.finish())
+}
+
+/// B36.
+pub fn refractive_noise(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let glass = scenes::RING_AND_GLASS
+        .split("AttributeBegin\n    Material \"conductor\"")
+        .next()
+        .unwrap_or_default()
+        .to_string()
+        + "AttributeBegin\nMaterial \"dielectric\" \"float eta\" 1.5\nTranslate 0.2 0.45 0.1\nShape \"sphere\" \"float radius\" 0.45\nAttributeEnd\n";
+    let task = Task { scene: "glass-alone", text: &glass, size: [40, 30], depth: Some(8) };
+    let Some(photon) = runs(c, &task, "photon", &[], c.spp(64), 6)? else { return Ok(Outcome::waits(MISSING)) };
+    let reference = photon.mean();
+    let Some(path) = runs(c, &task, "path", &[], c.spp(64), 6)? else { return Ok(Outcome::waits(MISSING)) };
+    let ((a, median), (b, _)) = (path.fireflies(&reference), photon.fireflies(&reference));
+    sheet.at_least("path tracing: largest over median tile deviation", a / median, 10.0);
+    sheet.at_least("largest tile deviation, path tracing over photon mapping", a / b, 10.0);
+    sheet.command(c.command("glass-alone", "--integrator photon"));
+    Ok(sheet.finish())
+}
+
+/// B42.
+pub fn the_bad(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let task = ring();
+    let Some(reference) = runs(c, &task, "photon", &[], c.spp(256), 2)? else { return Ok(Outcome::waits(MISSING)) };
+    let reference = reference.mean();
+    let most = c.spp(128).min(1000);
+    let Some(path) = runs(c, &task, "path", &[], most, 4)? else { return Ok(Outcome::waits(MISSING)) };
+    let Some(photon) = runs(c, &task, "photon", &[], 10, 4)? else { return Ok(Outcome::waits(MISSING)) };
+    sheet.at_least(
+        &format!("relMSE, path tracing at {most} over photon mapping at 10 samples"),
+        path.rel_mse(&reference) / photon.rel_mse(&reference),
+        2.0,
+    );
+    let size = [c.side(104), c.side(78)];
+    let wide = Task { size, ..ring() };
+    for (row, name) in ["path", "photon"].into_iter().enumerate() {
+        let mut images = vec![];
+        for spp in [10, 100, c.spp(128).min(1000)] {
+            let Some(run) = runs(c, &wide, name, &[], spp, 1)? else { return Ok(Outcome::waits(MISSING)) };
+            images.push(run.pictures[0].image());
+        }
+        let caption =
+            format!("{}: 10, 100 and {} samples.", ["Path tracing", "Photon mapping"][row], c.spp(128).min(1000));
+        sheet.picture(&format!("B42-{name}"), &caption, &strip(&images.iter().collect::<Vec<_>>()), 0.0);
+        sheet.command(c.command("ring-and-glass", &format!("--integrator {name} --spp 100")));
+    }
+    Ok(sheet.finish())
+}
+
+/// B46.
+pub fn photons(c: &Context) -> Result<Outcome, Error> {
+    let mut sheet = Sheet::new();
+    let text = scenes::lit_box(24);
+    let task = Task { scene: "lit-box", text: &text, size: [24, 24], depth: Some(3) };
+    let Some(path) = runs(c, &task, "path", &[], c.spp(1024), 1)? else { return Ok(Outcome::waits(MISSING)) };
+    let reference = path.mean();
+    // A kept radius is a kept bias: difference of two runs' mean to the reference, noise taken off by their product.
+    let mut bias = vec![];
+    for radius in ["0.4", "0.2", "0.1"] {
+        let options = [("radius", radius), ("alpha", "1"), ("paths", "16000")];
+        let Some(run) = runs(c, &task, "photon", &options, c.spp(24), 2)? else { return Ok(Outcome::waits(MISSING)) };
+        let mut square = Mean::new();
+        for i in 0..reference.mean.len() {
+            let d = [0, 1].map(|k| run.pictures[k].mean[i][1] - reference.mean[i][1]);
+            square.add(d[0] * d[1] - reference.variance[i][1]);
+        }
+        bias.push(square.mean().max(0.0).sqrt() / reference.grey());
+    }
+    sheet.note(format!(
+        "Bias (root mean square over pixels) at radius 0.4, 0.2, 0.1: {}, {}, {}.",
+        number(bias[0]),
+        number(bias[1]),
+        number(bias[2])
+    ));
+    sheet.at_least("bias at radius 0.4 over that at 0.2 (2 at edges, 4 on smooth light)", bias[0] / bias[1], 1.4);
+    sheet.at_least("bias at radius 0.2 over that at 0.1", bias[1] / bias[2], 1.4);
+    // With a shrinking radius the error goes on falling.
+    let mut error = vec![];
+    for spp in [8, 32, 128] {
+        let options = [("radius", "0.3"), ("paths", "2000")];
+        let Some(run) = runs(c, &task, "photon", &options, spp, 1)? else { return Ok(Outcome::waits(MISSING)) };
+        error.push(run.pictures[0].rmse(&reference));
+    }
+    sheet.at_least("progressive: RMSE at 8 passes over that at 32", error[0] / error[1], 1.3);
+    sheet.at_least("progressive: RMSE at 32 passes over that at 128", error[1] / error[2], 1.3);
+    sheet.command(c.command("lit-box", "--integrator photon --estimator radius=0.1"));
+    Ok(sheet.finish())
+}
