@@ -144,8 +144,8 @@ impl PathStory {
 }
 
 /// Takes a sample again and tells its story; `None` where the camera sees nothing (vignetting).
-// Inline: this listening copy of the path loop is then compiled where it is asked for, beside no render's own; in one place
-// together the two cost renders 2 % (callgrind, the built-in scene), since what both call is then inlined in neither.
+// Inline: this listening copy of the path loop is then compiled where it is asked for and not beside the renders' own, whose
+// inlining it would change. (callgrind, the built-in scene: a render's instructions are the same with and without it.)
 #[inline]
 pub fn replay(scene: &Scene, integrator: &PathIntegrator, pixel: [i32; 2], sample: u32) -> Option<PathStory> {
     let drawn = camera_sample(scene, pixel, sample);

@@ -76,6 +76,17 @@ impl Runs {
         sum.mean()
     }
 
+    /// Relative squared error of the runs against a reference of its own: noise, and what they miss or blur.
+    fn rel_error(&self, reference: &Estimate) -> f64 {
+        let floor = 0.02 * reference.grey();
+        let mut sum = Mean::new();
+        for p in &self.pictures {
+            let pixels = p.mean.iter().zip(&reference.mean);
+            pixels.for_each(|(a, b)| sum.add((a[1] - b[1]).powi(2) / (b[1].powi(2) + floor * floor)));
+        }
+        sum.mean()
+    }
+
     /// Largest and median deviation of tiles of 5 by 5 pixels from run to run, relative to the reference there.
     fn fireflies(&self, reference: &Estimate) -> (f64, f64) {
         let w = reference.width;
@@ -179,13 +190,18 @@ pub fn refractive_noise(c: &Context) -> Result<Outcome, Error> {
         .unwrap_or_default()
         .to_string()
         + "AttributeBegin\nMaterial \"dielectric\" \"float eta\" 1.5\nTranslate 0.2 0.45 0.1\nShape \"sphere\" \"float radius\" 0.45\nAttributeEnd\n";
+    // A lamp that chance does meet now and then.
+    let glass = glass.replace("radius\" 0.05", "radius\" 0.15").replace("3600 3320 2800", "400 369 311");
     let task = Task { scene: "glass-alone", text: &glass, size: [40, 30], depth: Some(8) };
-    let Some(photon) = runs(c, &task, "photon", &[], c.spp(64), 6)? else { return Ok(Outcome::waits(MISSING)) };
-    let reference = photon.mean();
+    // Paths from both sides find this caustic well: the reference.
+    let Some(reference) = runs(c, &task, "bdpt", &[], c.spp(512), 2)? else { return Ok(Outcome::waits(MISSING)) };
+    let reference = reference.mean();
     let Some(path) = runs(c, &task, "path", &[], c.spp(64), 6)? else { return Ok(Outcome::waits(MISSING)) };
-    let ((a, median), (b, _)) = (path.fireflies(&reference), photon.fireflies(&reference));
-    sheet.at_least("path tracing: largest over median tile deviation", a / median, 10.0);
-    sheet.at_least("largest tile deviation, path tracing over photon mapping", a / b, 10.0);
+    let Some(photon) = runs(c, &task, "photon", &[], c.spp(64), 6)? else { return Ok(Outcome::waits(MISSING)) };
+    let (largest, median) = path.fireflies(&reference);
+    sheet.at_least("path tracing: largest over median deviation of tiles", largest / median, 10.0);
+    let reduced = path.rel_error(&reference) / photon.rel_error(&reference);
+    sheet.at_least("relMSE at as many samples, path tracing over photon mapping", reduced, 10.0);
     sheet.command(c.command("glass-alone", "--integrator photon"));
     Ok(sheet.finish())
 }
@@ -198,9 +214,9 @@ pub fn the_bad(c: &Context) -> Result<Outcome, Error> {
     let reference = reference.mean();
     let most = c.spp(128).min(1000);
     let Some(path) = runs(c, &task, "path", &[], most, 4)? else { return Ok(Outcome::waits(MISSING)) };
-    let Some(photon) = runs(c, &task, "photon", &[], 10, 4)? else { return Ok(Outcome::waits(MISSING)) };
+    let Some(photon) = runs(c, &task, "photon", &[], most / 4, 4)? else { return Ok(Outcome::waits(MISSING)) };
     sheet.at_least(
-        &format!("relMSE, path tracing at {most} over photon mapping at 10 samples"),
+        &format!("relMSE, path tracing at {most} over photon mapping at a quarter of that"),
         path.rel_mse(&reference) / photon.rel_mse(&reference),
         2.0,
     );
@@ -227,26 +243,25 @@ pub fn photons(c: &Context) -> Result<Outcome, Error> {
     let task = Task { scene: "lit-box", text: &text, size: [24, 24], depth: Some(3) };
     let Some(path) = runs(c, &task, "path", &[], c.spp(1024), 1)? else { return Ok(Outcome::waits(MISSING)) };
     let reference = path.mean();
-    // A kept radius is a kept bias: difference of two runs' mean to the reference, noise taken off by their product.
+    // A kept radius is a kept bias: the mean product of different runs' differences to the reference, in which noise cancels.
     let mut bias = vec![];
-    for radius in ["0.4", "0.2", "0.1"] {
+    for radius in ["0.4", "0.1"] {
         let options = [("radius", radius), ("alpha", "1"), ("paths", "16000")];
-        let Some(run) = runs(c, &task, "photon", &options, c.spp(24), 2)? else { return Ok(Outcome::waits(MISSING)) };
+        let Some(run) = runs(c, &task, "photon", &options, c.spp(16), 4)? else { return Ok(Outcome::waits(MISSING)) };
         let mut square = Mean::new();
         for i in 0..reference.mean.len() {
-            let d = [0, 1].map(|k| run.pictures[k].mean[i][1] - reference.mean[i][1]);
-            square.add(d[0] * d[1] - reference.variance[i][1]);
+            let d: Vec<f64> = run.pictures.iter().map(|p| p.mean[i][1] - reference.mean[i][1]).collect();
+            let (sum, squares) = (d.iter().sum::<f64>(), d.iter().map(|x| x * x).sum::<f64>());
+            square.add((sum * sum - squares) / 12.0 - reference.variance[i][1]);
         }
         bias.push(square.mean().max(0.0).sqrt() / reference.grey());
     }
     sheet.note(format!(
-        "Bias (root mean square over pixels) at radius 0.4, 0.2, 0.1: {}, {}, {}.",
+        "Bias (root mean square over pixels) at radius 0.4 and 0.1: {} and {}.",
         number(bias[0]),
-        number(bias[1]),
-        number(bias[2])
+        number(bias[1])
     ));
-    sheet.at_least("bias at radius 0.4 over that at 0.2 (2 at edges, 4 on smooth light)", bias[0] / bias[1], 1.4);
-    sheet.at_least("bias at radius 0.2 over that at 0.1", bias[1] / bias[2], 1.4);
+    sheet.at_least("bias at radius 0.4 over that at 0.1 (4 at edges, 16 on smooth light)", bias[0] / bias[1], 2.5);
     // With a shrinking radius the error goes on falling.
     let mut error = vec![];
     for spp in [8, 32, 128] {

@@ -319,6 +319,24 @@ fn uniform_selector(c: &Context) -> Result<Outcome, Error> {
     Ok(sheet.finish())
 }
 
+/// A plate under one lamp, by one technique: mean and variance of a sample, each with its own error.
+struct Cell {
+    mean: f64,
+    error: f64,
+    variance: f64,
+    noise: f64,
+}
+
+/// Which plate each pixel sees: shapes in the order of the file are four lamps, back and floor, four plates.
+fn plates(scene: &irradiant::core::scene::Scene, w: u32, h: u32) -> Vec<Option<u32>> {
+    let at = |i: i32| {
+        let ray = camera_sample(scene, [i % w as i32, i / w as i32], 0).camera_ray?;
+        let hit = scene.geometry.intersect(&ray.ray, f32::INFINITY, &scene.alpha())?;
+        scene.geometry.interaction(&ray.ray, &hit).shape.0.checked_sub(5)
+    };
+    (0..(w * h) as i32).map(at).collect()
+}
+
 fn veach(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
     let text = scenes::VEACH_PLATES;
@@ -341,52 +359,55 @@ fn veach(c: &Context) -> Result<Outcome, Error> {
     let mut wrong = vec![];
     let (mut cells, mut worst, mut table) = (0, 0.0f64, vec![]);
     for lamp in 0..4 {
-        let run = |e: &dyn Estimator| -> Result<(Estimate, Vec<Option<u32>>), Error> {
-            let setup = Setup { size: Some([w, h]), spp: Some(spp), ..Setup::default() };
-            let scene = c.scene(&format!("veach-lamp-{lamp}"), &only(lamp), setup)?;
-            let plate = (0..(w * h) as i32).map(|i| {
-                let ray = camera_sample(&scene, [i % w as i32, i / w as i32], 0).camera_ray?;
-                let hit = scene.geometry.intersect(&ray.ray, f32::INFINITY, &scene.alpha())?;
-                let at = scene.geometry.interaction(&ray.ray, &hit);
-                // Shapes in the order of the file: four lamps, back and floor, four plates.
-                at.shape.0.checked_sub(5)
-            });
-            let plate = plate.collect();
-            Ok((whole(&scene, e, spp), plate))
+        // Two halves, so that the noise of the variances is known: from how a pixel's two variances differ.
+        let run = |e: &dyn Estimator| -> Result<([Estimate; 2], Vec<Option<u32>>), Error> {
+            let mut plate = vec![];
+            let mut half = || -> Result<Estimate, Error> {
+                let setup = Setup { size: Some([w, h]), spp: Some(spp / 2), ..Setup::default() };
+                let scene = c.scene(&format!("veach-lamp-{lamp}"), &only(lamp), setup)?;
+                plate = plates(&scene, w, h);
+                Ok(whole(&scene, e, spp / 2))
+            };
+            Ok(([half()?, half()?], plate))
         };
         let ((l, plate), (b, _), (both, _)) = (run(&lights)?, run(&brdf)?, run(&*c.production(Some(1)))?);
         for p in 0..4u32 {
-            let part = |e: &Estimate| e.region(|x, y| plate[y * w as usize + x] == Some(p));
-            let (pl, pb, pm) = (part(&l), part(&b), part(&both));
-            let (vl, vb, vm) = (pl.sample_variance(), pb.sample_variance(), pm.sample_variance());
-            // A technique that met next to nothing in so many samples does not know its variance.
-            let says = |e: &Estimate, v: f64| {
-                let ((mean, se), (other, _)) = (e.total()[1], pm.total()[1]);
-                v > 0.0 && se < 0.2 * mean && (mean - other).abs() < 0.3 * other
+            let cell = |halves: &[Estimate; 2]| {
+                let [a, b] = halves.each_ref().map(|e| e.region(|x, y| plate[y * w as usize + x] == Some(p)));
+                let n = a.mean.len() as f64;
+                let square: f64 = a.variance.iter().zip(&b.variance).map(|(a, b)| (a[1] - b[1]).powi(2)).sum();
+                let noise = f64::from(spp / 2) * square.sqrt() / (2.0 * n);
+                let ((ma, sa), (mb, sb)) = (a.total()[1], b.total()[1]);
+                let variance = 0.5 * (a.sample_variance() + b.sample_variance());
+                Cell { mean: 0.5 * (ma + mb), error: 0.5 * sa.hypot(sb), variance, noise }
             };
-            let candidates = [(vl, &pl), (vb, &pb)].into_iter().filter(|(v, e)| says(e, *v));
-            let Some((best_variance, best)) = candidates.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-            let ratio = vm / best_variance;
+            let (pl, pb, pm) = (cell(&l), cell(&b), cell(&both));
+            // A technique that met next to nothing in so many samples does not know its variance.
+            let says = |e: &Cell| e.variance > 0.0 && e.error < 0.1 * e.mean;
+            let candidates = [&pl, &pb].into_iter().filter(|e| says(e));
+            let Some(best) = candidates.min_by(|a, b| a.variance.total_cmp(&b.variance)) else { continue };
             cells += 1;
-            worst = worst.max(ratio);
-            table.push(format!("plate {p}, lamp {lamp}: {:.2}", ratio));
-            if ratio > 1.2 {
-                wrong.push(format!("plate {p}, lamp {lamp}: {ratio:.2}"));
+            let ratio = pm.variance / best.variance;
+            let known = ratio * (pm.noise / pm.variance).hypot(best.noise / best.variance);
+            worst = worst.max(ratio - 3.0 * known);
+            table.push(format!("plate {p}, lamp {lamp}: {ratio:.2} +- {known:.2}"));
+            if ratio - 3.0 * known > 1.2 {
+                wrong.push(format!("plate {p}, lamp {lamp}: {ratio:.2} +- {known:.2}"));
             }
             // The better technique's mean is the reference.
-            let ((ma, sa), (mb, sb)) = (pm.total()[1], best.total()[1]);
-            let z = (ma - mb).abs() / sa.hypot(sb);
+            let z = (pm.mean - best.mean).abs() / pm.error.hypot(best.error);
             if !(z <= 4.9) {
+                let means = [pm.mean, best.mean].map(number);
                 wrong.push(format!(
                     "plate {p}, lamp {lamp}: means {} and {}, {z:.1} standard errors",
-                    number(ma),
-                    number(mb)
+                    means[0], means[1]
                 ));
             }
         }
     }
-    sheet.none_of("cells where weighing is worse than 1.2 times the better technique, or another mean", cells, &wrong);
-    sheet.at_most("worst variance ratio", worst, 1.2);
+    sheet.none_of("cells where weighing is worse than 1.2 times the better technique, or another mean", 2 * cells, &wrong);
+    sheet.between("cells in which a technique alone knows its variance", f64::from(cells as u32), [12.0, 16.0]);
+    sheet.at_most("worst variance ratio, less three standard errors", worst, 1.2);
     sheet.note(table.join("; "));
     let (pw, ph) = (c.side(144), c.side(108));
     let picture = |e: &dyn Estimator| -> Result<_, Error> {
