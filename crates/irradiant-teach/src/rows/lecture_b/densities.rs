@@ -405,7 +405,11 @@ fn veach(c: &Context) -> Result<Outcome, Error> {
             }
         }
     }
-    sheet.none_of("cells where weighing is worse than 1.2 times the better technique, or another mean", 2 * cells, &wrong);
+    sheet.none_of(
+        "cells where weighing is worse than 1.2 times the better technique, or another mean",
+        2 * cells,
+        &wrong,
+    );
     sheet.between("cells in which a technique alone knows its variance", f64::from(cells as u32), [12.0, 16.0]);
     sheet.at_most("worst variance ratio, less three standard errors", worst, 1.2);
     sheet.note(table.join("; "));
