@@ -442,7 +442,20 @@ pub(crate) fn owned(names: &[&str]) -> Vec<String> {
 }
 
 fn pick<T: Copy>(samples: &[T], count: usize, indices: &[usize]) -> Vec<T> {
-    samples.chunks_exact(count).flat_map(|pixel| indices.iter().map(|&index| pixel[index])).collect()
+    if indices.iter().copied().eq(0..count) {
+        return samples.to_vec();
+    }
+    let mut picked = Vec::with_capacity(samples.len() / count * indices.len());
+    if let &[r, g, b] = indices {
+        for pixel in samples.chunks_exact(count) {
+            picked.extend_from_slice(&[pixel[r], pixel[g], pixel[b]]);
+        }
+    } else {
+        for pixel in samples.chunks_exact(count) {
+            picked.extend(indices.iter().map(|&index| pixel[index]));
+        }
+    }
+    picked
 }
 
 fn flip_rows<T>(samples: &mut [T], row: usize) {

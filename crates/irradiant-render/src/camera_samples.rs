@@ -6,7 +6,8 @@ use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
 use irradiant_core::sampler::SampleStream;
 use irradiant_core::scene::Scene;
-use irradiant_math::Point2;
+use irradiant_core::geometry::Hit;
+use irradiant_math::{Point2, Ray};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
 /// A sample on its way: random numbers, wavelengths, the camera's ray.
@@ -39,6 +40,15 @@ pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample
     CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
 }
 
+/// Camera rays that are traced together.
+///
+/// Neighbours in the picture go the same way, so that their walks through the tree are one walk: in the Cornell box a camera ray
+/// then takes a third of the instructions.
+const TOGETHER: usize = 64;
+
+/// Samples are taken in squares of so many pixels a side: those of a few samples per pixel fill a batch with neighbours.
+const SQUARE: usize = 4;
+
 /// Takes all samples of a unit. `radiance` estimates what a camera ray sees (W m^-2 sr^-1 nm^-1 at the sample's
 /// wavelengths, which it may reduce to one), and may fill the film's layers.
 pub fn for_each_sample(
@@ -49,25 +59,98 @@ pub fn for_each_sample(
     mut radiance: impl FnMut(&CameraSample, &CameraRay, &mut Wavelengths, &mut [f32], &mut RenderStats) -> SampledSpectrum,
 ) {
     let mut layers = vec![0f32; scene.layers.channels()];
-    for y in unit.bounds.y0..unit.bounds.y1 {
-        for x in unit.bounds.x0..unit.bounds.x1 {
-            for index in unit.samples.clone() {
-                let sample = camera_sample(scene, [x, y], index);
-                stats.paths += 1;
-                layers.fill(0.0);
-                let mut rgb = [0.0; 3];
-                if let Some(camera_ray) = &sample.camera_ray {
-                    stats.camera_rays += 1;
-                    let mut lambda = sample.lambda;
-                    let l = radiance(&sample, camera_ray, &mut lambda, &mut layers, stats) * camera_ray.weight;
-                    rgb = scene.film_rgb(l, &lambda).map(|c| c * sample.filter_weight);
-                    scene.layers.add_buckets(l, &lambda, &mut layers);
-                    layers.iter_mut().for_each(|value| *value *= sample.filter_weight);
-                }
-                if !tile.add(x, y, rgb, &layers) {
-                    stats.refuse(x, y, index);
+    for_each_place(unit, |pixel, index| {
+        let sample = camera_sample(scene, pixel, index);
+        add_sample(scene, &sample, tile, &mut layers, stats, &mut radiance);
+    });
+}
+
+/// As [`for_each_sample`], for estimators that begin with the closest surface along the camera ray: `radiance` is told what
+/// [`Geometry::intersect`](irradiant_core::geometry::Geometry::intersect) says of it, to the bit. Many rays are traced at once.
+pub fn for_each_first_hit(
+    scene: &Scene,
+    unit: &WorkUnit,
+    tile: &mut FilmTile,
+    stats: &mut RenderStats,
+    mut radiance: impl FnMut(
+        &CameraSample,
+        &CameraRay,
+        Option<Hit>,
+        &mut Wavelengths,
+        &mut [f32],
+        &mut RenderStats,
+    ) -> SampledSpectrum,
+) {
+    let mut layers = vec![0f32; scene.layers.channels()];
+    let mut samples: Vec<CameraSample> = Vec::with_capacity(TOGETHER);
+    let mut rays: Vec<Ray> = Vec::with_capacity(TOGETHER);
+    let mut hits = [None; TOGETHER];
+    let mut trace = |samples: &mut Vec<CameraSample>| {
+        rays.clear();
+        rays.extend(samples.iter().filter_map(|sample| sample.camera_ray.map(|camera_ray| camera_ray.ray)));
+        let hits = &mut hits[..rays.len()];
+        scene.geometry.intersect_batch(&rays, &[f32::INFINITY; TOGETHER][..rays.len()], &scene.alpha(), hits);
+        let mut hits = hits.iter();
+        for sample in samples.drain(..) {
+            // Asked for by those samples that have a ray only.
+            let first = sample.camera_ray.and_then(|_| hits.next().copied().flatten());
+            add_sample(scene, &sample, tile, &mut layers, stats, &mut |sample, ray, lambda, layers, stats| {
+                radiance(sample, ray, first, lambda, layers, stats)
+            });
+        }
+    };
+    for_each_place(unit, |pixel, index| {
+        samples.push(camera_sample(scene, pixel, index));
+        if samples.len() == TOGETHER {
+            trace(&mut samples);
+        }
+    });
+    trace(&mut samples);
+}
+
+/// Each sample of each pixel, neighbours one after another.
+fn for_each_place(unit: &WorkUnit, mut visit: impl FnMut([i32; 2], u32)) {
+    let b = &unit.bounds;
+    for top in (b.y0..b.y1).step_by(SQUARE) {
+        for left in (b.x0..b.x1).step_by(SQUARE) {
+            for y in top..b.y1.min(top + SQUARE as i32) {
+                for x in left..b.x1.min(left + SQUARE as i32) {
+                    unit.samples.clone().for_each(|index| visit([x, y], index));
                 }
             }
         }
+    }
+}
+
+/// Takes one sample. `layers` is scratch space.
+#[inline]
+fn add_sample(
+    scene: &Scene,
+    sample: &CameraSample,
+    tile: &mut FilmTile,
+    layers: &mut [f32],
+    stats: &mut RenderStats,
+    radiance: &mut impl FnMut(
+        &CameraSample,
+        &CameraRay,
+        &mut Wavelengths,
+        &mut [f32],
+        &mut RenderStats,
+    ) -> SampledSpectrum,
+) {
+    stats.paths += 1;
+    layers.fill(0.0);
+    let mut rgb = [0.0; 3];
+    if let Some(camera_ray) = &sample.camera_ray {
+        stats.camera_rays += 1;
+        let mut lambda = sample.lambda;
+        let l = radiance(sample, camera_ray, &mut lambda, layers, stats) * camera_ray.weight;
+        rgb = scene.film_rgb(l, &lambda).map(|c| c * sample.filter_weight);
+        scene.layers.add_buckets(l, &lambda, layers);
+        layers.iter_mut().for_each(|value| *value *= sample.filter_weight);
+    }
+    let [x, y] = sample.pixel;
+    if !tile.add(x, y, rgb, layers) {
+        stats.refuse(x, y, sample.index);
     }
 }

@@ -5,13 +5,14 @@
 //! share one set of decisions whose densities do not depend on wavelength, so that no wavelength weighting is needed;
 //! a dispersive vertex ends the secondary ones.
 
-use crate::camera_samples::for_each_sample;
+use crate::camera_samples::for_each_first_hit;
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
+use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::{Interaction, ReferencePoint};
 use irradiant_core::light::SampleMode;
 use irradiant_core::light_sampler::PickedLight;
@@ -31,8 +32,8 @@ pub struct PathIntegrator {
 
 impl Integrator for PathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
-        for_each_sample(scene, unit, tile, stats, |sample, camera_ray, lambda, layers, stats| {
-            self.radiance(scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
+        for_each_first_hit(scene, unit, tile, stats, |sample, camera_ray, first, lambda, layers, stats| {
+            self.radiance_from(first, scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
         });
     }
 
@@ -82,7 +83,24 @@ impl PathIntegrator {
         stats: &mut RenderStats,
         recorder: &mut R,
     ) -> SampledSpectrum {
+        let first = scene.geometry.intersect(&camera_ray.ray, f32::INFINITY, &scene.alpha());
+        self.radiance_from(first, scene, camera_ray, stream, lambda, layers, stats, recorder)
+    }
+
+    /// As [`PathIntegrator::radiance`], if `first` is what the camera ray meets.
+    fn radiance_from<R: PathRecorder>(
+        &self,
+        first: Option<Hit>,
+        scene: &Scene,
+        camera_ray: &CameraRay,
+        stream: &SampleStream,
+        lambda: &mut Wavelengths,
+        layers: &mut [f32],
+        stats: &mut RenderStats,
+        recorder: &mut R,
+    ) -> SampledSpectrum {
         let mut ray = camera_ray.ray;
+        let mut met = first;
         let mut radiance = SampledSpectrum::ZERO;
         let mut throughput = SampledSpectrum::ONE;
         let mut depth = 0;
@@ -94,7 +112,7 @@ impl PathIntegrator {
         recorder.begin(lambda);
 
         let why = loop {
-            let Some(hit) = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha()) else {
+            let Some(hit) = met else {
                 let previous = previous.as_ref();
                 radiance += self.escaped(scene, &ray, escape_place, &throughput, lambda, previous, depth, recorder);
                 break PathEnd::Escaped;
@@ -108,19 +126,20 @@ impl PathIntegrator {
 
             let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
             let mix = stream.mix(depth);
-            let Some(mut bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix)
-            else {
+            let mut scattering = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix);
+            let Some(bsdf) = &mut scattering else {
                 // An interface: no surface, only a boundary. Weighing lights across it would need its light sampling too.
                 ray = at.spawn_ray(ray.d);
                 if let Some(p) = &mut previous {
                     p.specular = true;
                 }
                 stats.bounce_rays += 1;
+                met = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha());
                 continue;
             };
-            recorder.vertex(depth, &at, &bsdf);
+            recorder.vertex(depth, &at, bsdf);
             if depth == 0 && !layers.is_empty() {
-                scene.layers.fill(layers, scene, camera_ray, &at, &footprint, &bsdf, lambda);
+                scene.layers.fill(layers, scene, camera_ray, &at, &footprint, bsdf, lambda);
             }
             if self.max_depth.is_some_and(|limit| depth >= limit) {
                 break PathEnd::MaxDepth;
@@ -131,7 +150,7 @@ impl PathIntegrator {
 
             // Direct light: one sample of one light.
             if bsdf.flags().is_non_specular() {
-                radiance += direct_light(scene, &at, &bsdf, &throughput, lambda, stream, depth, stats, recorder);
+                radiance += direct_light(scene, &at, bsdf, &throughput, lambda, stream, depth, stats, recorder);
             }
 
             // The next direction.
@@ -178,6 +197,7 @@ impl PathIntegrator {
             ray = at.spawn_ray(sample.wi);
             escape_place = scene.lights.place_of_escape(sample.wi);
             stats.bounce_rays += 1;
+            met = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha());
         };
         recorder.end(why);
         radiance

@@ -144,8 +144,8 @@ impl Pixel {
     /// Adds a weighted sample; false when it was refused (and counted).
     #[inline]
     pub fn add(&mut self, rgb: [f32; 3]) -> bool {
-        let quantised = rgb.map(ExactSum::quantised);
-        let [Some(r), Some(g), Some(b)] = quantised else {
+        let quantised = (ExactSum::quantised(rgb[0]), ExactSum::quantised(rgb[1]), ExactSum::quantised(rgb[2]));
+        let (Some(r), Some(g), Some(b)) = quantised else {
             if rgb.iter().all(|x| x.is_finite()) {
                 self.out_of_range += 1;
             } else {

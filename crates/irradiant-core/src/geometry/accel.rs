@@ -56,11 +56,56 @@ pub(crate) struct MeshRange {
     pub mesh: u32,
 }
 
+/// Which mesh each triangle of a tree belongs to.
+#[derive(Debug, Default)]
+pub(crate) struct MeshRanges {
+    ranges: Vec<MeshRange>,
+    /// For each [`STRIDE`](Self::STRIDE) of triangles, and once past the last, the range of the first of them.
+    guide: Vec<u32>,
+}
+
+impl MeshRanges {
+    /// Triangles that share an entry of the guide.
+    const STRIDE: usize = 64;
+
+    /// Of ranges that begin at 0 and follow each other, `triangles` in all.
+    pub fn new(ranges: Vec<MeshRange>, triangles: u32) -> Self {
+        let entries = if ranges.is_empty() { 0 } else { (triangles as usize).div_ceil(Self::STRIDE) + 1 };
+        let range_of = |entry| {
+            let triangle = ((entry * Self::STRIDE) as u64).min(u64::from(triangles).saturating_sub(1));
+            ranges.partition_point(|r: &MeshRange| u64::from(r.first) <= triangle) as u32 - 1
+        };
+        let guide = (0..entries).map(range_of).collect();
+        Self { ranges, guide }
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = &MeshRange> {
+        self.ranges.iter()
+    }
+
+    /// The range that a triangle is in.
+    #[inline]
+    fn of(&self, triangle: u32) -> MeshRange {
+        let entry = triangle as usize / Self::STRIDE;
+        let (low, high) = (self.guide[entry] as usize, self.guide[entry + 1] as usize);
+        if low == high {
+            return self.ranges[low];
+        }
+        self.ranges[low + self.ranges[low + 1..=high].partition_point(|r| r.first <= triangle)]
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(&self.ranges[..]) + size_of_val(&self.guide[..])
+    }
+}
+
 /// A tree and what its primitives are.
 #[derive(Debug)]
 pub(crate) struct Group {
     pub tree: bvh::Bvh,
-    pub ranges: Vec<MeshRange>,
+    pub ranges: MeshRanges,
     pub users: Vec<User>,
 }
 
@@ -68,8 +113,7 @@ impl Group {
     /// The mesh of a triangle of the tree, and its index there.
     #[inline]
     pub fn triangle(&self, primitive: u32) -> (u32, u32) {
-        let i = self.ranges.partition_point(|r| r.first <= primitive) - 1;
-        let range = self.ranges[i];
+        let range = self.ranges.of(primitive);
         (range.mesh, primitive - range.first)
     }
 }

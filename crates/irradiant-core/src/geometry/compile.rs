@@ -1,6 +1,6 @@
 //! From the description to [`Geometry`]: range checks, transforms, trees.
 
-use super::accel::{Alpha, Group, MeshRange, NO_EMITTER, ShapeInfo, Shapes, User};
+use super::accel::{Alpha, Group, MeshRange, MeshRanges, NO_EMITTER, ShapeInfo, Shapes, User};
 use super::curve::Curve;
 use super::cylinder::Cylinder;
 use super::disk::Disk;
@@ -422,6 +422,6 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
         }
         let input = bvh::BuildInput { meshes: &meshes, user_boxes: &members.boxes };
         let tree = bvh::Bvh::build(&input, &bvh::BuildSettings::default());
-        Group { tree, ranges, users: members.users }
+        Group { tree, ranges: MeshRanges::new(ranges, first), users: members.users }
     }
 }

@@ -197,6 +197,7 @@ impl Geometry {
     }
 
     /// What the ray met at `hit` (which [`Geometry::intersect`] gave for this very ray).
+    #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
         let mut at = Interaction {
             p: Point3::ZERO,
@@ -337,7 +338,7 @@ impl Geometry {
             + size_of_val(&s.cylinders[..])
             + size_of_val(&s.instances[..])
             + size_of_val(&s.infos[..])
-            + self.groups.iter().map(|g| g.tree.memory_bytes() + size_of_val(&g.users[..])).sum::<usize>()
+            + self.groups.iter().map(|g| g.tree.memory_bytes() + g.ranges.memory_bytes() + size_of_val(&g.users[..])).sum::<usize>()
             + self.emitters.iter().map(|e| size_of_val(e) + e.geometry.memory_bytes()).sum::<usize>()
     }
 }

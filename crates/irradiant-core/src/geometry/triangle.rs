@@ -169,36 +169,35 @@ impl Mesh {
     /// Fills in all that is known of a hit at weights `u`, `v` of corners 1 and 2 of a triangle.
     pub fn triangle_interaction(&self, triangle: u32, u: f32, v: f32, at: &mut Interaction) {
         let indices = self.triangles[triangle as usize];
-        let [p0, p1, p2] = indices.map(|i| self.position(i));
-        let b = [1.0 - u - v, u, v];
-        let uvs = self.triangle_uvs(triangle);
+        let (p0, p1, p2) = (self.position(indices[0]), self.position(indices[1]), self.position(indices[2]));
         (at.p, at.p_error) = triangle_point([p0, p1, p2], u, v);
-        at.uv = interpolate2(&uvs, b);
         at.face = self.face(triangle as usize);
-
         let (dp02, dp12) = (p0 - p2, p1 - p2);
-        let d02 = [uvs[0][0] - uvs[2][0], uvs[0][1] - uvs[2][1]];
-        let d12 = [uvs[1][0] - uvs[2][0], uvs[1][1] - uvs[2][1]];
-        let determinant = difference_of_products(d02[0], d12[1], d02[1], d12[0]);
-        let has_uv = determinant.abs() >= 1e-9;
         // In f64 and scaled by the largest edge, so that no triangle with an area loses its normal.
         let (e02, e12) = (double(dp02.to_array()), double(dp12.to_array()));
         let normal = cross(e02, e12);
         let length = super::placement::length(normal);
         let normal = if length > 0.0 && length.is_finite() { scale(normal, 1.0 / length) } else { [0.0, 0.0, 1.0] };
         let mut n: Normal3 = single(normal).into();
-        let inverse = 1.0 / determinant;
-        let (mut dpdu, mut dpdv) = (Vec3::ZERO, Vec3::ZERO);
+        // Derivatives of the default coordinates, which span the triangle itself; below a length of 1e-18 squares vanish.
+        let (mut dpdu, mut dpdv) = (p1 - p0, p2 - p1);
+        let mut is_flat = !(length > 1e-18);
+        let (mut d02, mut d12, mut has_uv, mut inverse) = ([-1.0, -1.0], [0.0, -1.0], true, 1.0);
         if self.uvs.is_empty() {
-            // What the lines below say for the default coordinates.
-            (dpdu, dpdv) = (p1 - p0, p2 - p1);
-        } else if has_uv {
-            dpdu = combine(d12[1], dp02, -d02[1], dp12) * inverse;
-            dpdv = combine(d02[0], dp12, -d12[0], dp02) * inverse;
+            at.uv = Point2::new(u + v, v);
+        } else {
+            let uvs = [self.uvs[indices[0] as usize], self.uvs[indices[1] as usize], self.uvs[indices[2] as usize]];
+            at.uv = interpolate2(&uvs, [1.0 - u - v, u, v]);
+            d02 = [uvs[0][0] - uvs[2][0], uvs[0][1] - uvs[2][1]];
+            d12 = [uvs[1][0] - uvs[2][0], uvs[1][1] - uvs[2][1]];
+            let determinant = difference_of_products(d02[0], d12[1], d02[1], d12[0]);
+            (has_uv, inverse) = (determinant.abs() >= 1e-9, 1.0 / determinant);
+            if has_uv {
+                dpdu = combine(d12[1], dp02, -d02[1], dp12) * inverse;
+                dpdv = combine(d02[0], dp12, -d12[0], dp02) * inverse;
+            }
+            is_flat = !has_uv || dpdu.cross(dpdv).length_squared() == 0.0;
         }
-        // Default coordinates span the triangle itself, whose normal is there already; below this, squares vanish.
-        let is_flat =
-            if self.uvs.is_empty() { !(length > 1e-18) } else { !has_uv || dpdu.cross(dpdv).length_squared() == 0.0 };
         if is_flat {
             // pbrt spans the tangent plane around -n here; any frame will do.
             let frame = Frame::from_z(-n.as_vec());
@@ -220,7 +219,7 @@ impl Mesh {
         let (mut dndu, mut dndv) = (Normal3::ZERO, Normal3::ZERO);
         if !self.normals.is_empty() {
             let [n0, n1, n2] = indices.map(|i| self.normal(i));
-            let sum = n0 * b[0] + n1 * b[1] + n2 * b[2];
+            let sum = n0 * (1.0 - u - v) + n1 * u + n2 * v;
             let length = sum.length();
             // The comparison is false for NaN too.
             if length > 0.0 && length.is_finite() {
@@ -242,7 +241,7 @@ impl Mesh {
         let mut ss = dpdu;
         if !self.tangents.is_empty() {
             let [s0, s1, s2] = indices.map(|i| Vec3::from(self.tangents[i as usize]));
-            let sum = s0 * b[0] + s1 * b[1] + s2 * b[2];
+            let sum = s0 * (1.0 - u - v) + s1 * u + s2 * v;
             let length_squared = sum.length_squared();
             if length_squared > 0.0 && length_squared.is_finite() {
                 ss = sum;
@@ -279,12 +278,11 @@ pub(crate) fn shade(at: &mut Interaction, ns: Normal3, dpdus: Vec3, dpdvs: Vec3,
 /// the vertices themselves were rounded and flat things made of several triangles are flat to that precision only.
 #[inline]
 pub(crate) fn triangle_point(p: [Point3; 3], u: f32, v: f32) -> (Point3, Vec3) {
-    let [q0, q1, q2] = p.map(|p| double(p.to_array()));
-    let (u, v) = (u as f64, v as f64);
-    let q = add(q0, add(scale(sub(q1, q0), u), scale(sub(q2, q0), v)));
-    let w = (1.0 - u - v).abs();
-    let error = [0, 1, 2].map(|i| (q0[i].abs() * w + q1[i].abs() * u.abs() + q2[i].abs() * v.abs()) as f32 * gamma(7));
-    (single(q).into(), error.into())
+    let [p0, p1, p2] = p;
+    let (q0, q1, q2) = (double(p0.to_array()), double(p1.to_array()), double(p2.to_array()));
+    let q = add(q0, add(scale(sub(q1, q0), u as f64), scale(sub(q2, q0), v as f64)));
+    let size = p0.as_vec().abs() * (1.0 - u - v).abs() + p1.as_vec().abs() * u.abs() + p2.as_vec().abs() * v.abs();
+    (single(q).into(), size * gamma(7))
 }
 
 #[inline]

@@ -95,21 +95,30 @@ fn from_half(half: u16) -> f32 {
     f32::from_bits(u32::from(half) << 13) * HALF_SCALE
 }
 
-/// The half of this value, if there is one.
-fn exact_half(v: f32) -> Option<u16> {
+/// The half of this value, and whether there is one. Without branches, so that an image is packed several at a time.
+#[inline]
+fn exact_half(v: f32) -> (u16, bool) {
     let bits = (v * (1.0 / HALF_SCALE)).to_bits() >> 13;
-    let half = u16::try_from(bits).ok().filter(|&h| h < 0x7c00)?;
-    (from_half(half) == v).then_some(half)
+    let half = bits as u16;
+    (half, (bits < 0x7c00) & (from_half(half) == v))
 }
 
 impl Pixels {
     fn new(pixels: Box<[[f32; 3]]>) -> Self {
-        let halves = |rgb: &[f32; 3]| Some([exact_half(rgb[0])?, exact_half(rgb[1])?, exact_half(rgb[2])?]);
+        /// After so many it is seen whether all were exact.
+        const STRETCH: usize = 4096;
         // A sky is looked up all over, more than the processor's table of small pages covers.
         let mut all = irradiant_bvh::vec_on_large_pages(pixels.len());
-        for rgb in &pixels {
-            let Some(rgb) = halves(rgb) else { return Self::Single(pixels) };
-            all.push(rgb);
+        for stretch in pixels.chunks(STRETCH) {
+            let mut exact = true;
+            all.extend(stretch.iter().map(|&[r, g, b]| {
+                let ((r, r_exact), (g, g_exact), (b, b_exact)) = (exact_half(r), exact_half(g), exact_half(b));
+                exact &= r_exact & g_exact & b_exact;
+                [r, g, b]
+            }));
+            if !exact {
+                return Self::Single(pixels);
+            }
         }
         Self::Half(all.into_boxed_slice())
     }
@@ -135,20 +144,18 @@ impl RadianceImage {
             return None;
         }
         let mut faults = ImageFaults::default();
-        let pixels: Box<[[f32; 3]]> = samples
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .enumerate()
-            .map(|(i, &rgb)| {
-                let finite = rgb.iter().all(|v| v.is_finite());
-                if !finite || rgb.iter().any(|&v| v < 0.0) {
-                    *(if finite { &mut faults.negative } else { &mut faults.not_finite }) += 1;
-                    faults.first.get_or_insert([i % width, i / width]);
-                }
-                rgb.map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 })
-            })
-            .collect();
+        let mut pixels: Box<[[f32; 3]]> = samples.as_chunks::<3>().0.into();
+        for (i, rgb) in pixels.iter_mut().enumerate() {
+            if rgb.iter().all(|v| (0.0..f32::INFINITY).contains(v)) {
+                continue;
+            }
+            let finite = rgb.iter().all(|v| v.is_finite());
+            *(if finite { &mut faults.negative } else { &mut faults.not_finite }) += 1;
+            faults.first.get_or_insert([i % width, i / width]);
+            for v in rgb {
+                *v = if v.is_finite() { v.max(0.0) } else { 0.0 };
+            }
+        }
         let space = color_space_of(image);
         Some((Self::from_pixels(width, height, pixels, space, render_space), faults))
     }
@@ -190,6 +197,24 @@ impl RadianceImage {
     /// Row by row from the top.
     pub fn pixels(&self) -> impl ExactSizeIterator<Item = [f32; 3]> + '_ {
         (0..self.width * self.height).map(|i| self.pixels.at(i))
+    }
+
+    /// The means of the channels of the pixels of row `y`, in order; `means` is as long as a row.
+    pub(super) fn row_means(&self, y: usize, means: &mut [f32]) {
+        let row = y * self.width..(y + 1) * self.width;
+        let mean = |[r, g, b]: [f32; 3]| (r + g + b) * (1.0 / 3.0);
+        match &self.pixels {
+            Pixels::Half(pixels) => {
+                for (value, &[r, g, b]) in means.iter_mut().zip(&pixels[row]) {
+                    *value = mean([from_half(r), from_half(g), from_half(b)]);
+                }
+            }
+            Pixels::Single(pixels) => {
+                for (value, &rgb) in means.iter_mut().zip(&pixels[row]) {
+                    *value = mean(rgb);
+                }
+            }
+        }
     }
 
     /// The pixel in column `x` of row `y` from the top, both within the image.
@@ -350,11 +375,11 @@ mod tests {
     #[test]
     fn halves_are_kept_as_halves_and_nothing_is_rounded() {
         for half in 0..0x7c00 {
-            assert_eq!(exact_half(from_half(half)), Some(half));
+            assert_eq!(exact_half(from_half(half)), (half, true));
         }
         assert_eq!((from_half(1), from_half(0x3c00), from_half(0x7bff)), (2f32.powi(-24), 1.0, 65504.0));
         for v in [1.000_1, 65_520.0, 1e9, 1e-9, f32::MAX, f32::MIN_POSITIVE] {
-            assert_eq!(exact_half(v), None, "{v}");
+            assert!(!exact_half(v).1, "{v}");
         }
         let image = |v| checker(1, 1).with_pixels(1, 1, Box::new([[v, 0.5, 0.25]]));
         assert!(matches!(image(2.0).pixels, Pixels::Half(_)) && matches!(image(0.1).pixels, Pixels::Single(_)));

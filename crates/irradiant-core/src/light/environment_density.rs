@@ -59,14 +59,24 @@ impl PixelDensity {
     ///
     /// `None` for an image without pixels. All-black images have density 0.
     pub fn new(image: &RadianceImage, compensated: bool) -> Option<Self> {
-        let sum = |weight: &dyn Fn([f32; 3]) -> f32| image.pixels().map(|rgb| f64::from(weight(rgb))).sum::<f64>();
         let (width, height) = (image.width(), image.height());
         let count = (width * height) as f64;
         let runs = width.div_ceil(RUN);
         // One more entry than runs, so that every run's end is the next entry of its line or of the next line.
         let lines_per_row = (runs + 1).div_ceil(LINE);
+        let mut row = vec![0.0; width];
+        let threshold = if compensated {
+            let mut sum = 0.0;
+            for y in 0..height {
+                image.row_means(y, &mut row);
+                sum += row.iter().map(|&mean| f64::from(mean)).sum::<f64>();
+            }
+            (sum / count) as f32
+        } else {
+            0.0
+        };
         let mut density = Self {
-            threshold: if compensated { (sum(&brightness) / count) as f32 } else { 0.0 },
+            threshold,
             base: 0.0,
             normalisation: 0.0,
             rows: PiecewiseConstant1D::new([1.0])?,
@@ -74,17 +84,15 @@ impl PixelDensity {
             coarse: Vec::with_capacity(lines_per_row * height),
             fine: Vec::with_capacity(lines_per_row * height),
         };
-        let mut total = sum(&|rgb| density.weight(rgb));
-        if compensated && total == 0.0 {
+        if compensated && !image.pixels().any(|rgb| density.weight(rgb) > 0.0) {
             density.base = 1.0;
-            total = count;
         }
         let mut row_sums = Vec::with_capacity(height);
         let mut run_sums = vec![0f64; runs];
         for y in 0..height {
-            for (run, sum) in run_sums.iter_mut().enumerate() {
-                let columns = run * RUN..width.min((run + 1) * RUN);
-                *sum = columns.map(|x| f64::from(density.weight(image.pixel(x, y)))).sum();
+            image.row_means(y, &mut row);
+            for (sum, run) in run_sums.iter_mut().zip(row.chunks(RUN)) {
+                *sum = run.iter().map(|&mean| f64::from(density.weight_of_mean(mean))).sum();
             }
             let row_sum: f64 = run_sums.iter().sum();
             row_sums.push(row_sum);
@@ -102,6 +110,7 @@ impl PixelDensity {
                 density.fine.push(line);
             }
         }
+        let total: f64 = row_sums.iter().sum();
         let largest = row_sums.iter().copied().fold(0.0, f64::max);
         let rows: Vec<f32> = row_sums.iter().map(|r| if largest > 0.0 { (r / largest) as f32 } else { 0.0 }).collect();
         density.rows = PiecewiseConstant1D::new(rows)?;
@@ -111,7 +120,12 @@ impl PixelDensity {
 
     #[inline]
     fn weight(&self, rgb: [f32; 3]) -> f32 {
-        (brightness(rgb) - self.threshold).max(0.0) + self.base
+        self.weight_of_mean(brightness(rgb))
+    }
+
+    #[inline]
+    fn weight_of_mean(&self, mean: f32) -> f32 {
+        (mean - self.threshold).max(0.0) + self.base
     }
 
     /// The density over the unit square at a pixel of this colour.

@@ -76,7 +76,7 @@ impl Materials {
             pbrt_coat_weights: false,
         };
         let mut entries: Vec<Entry> =
-            desc.materials.iter().map(|m| Entry { material: c.material(&m.kind), relief: c.relief(m) }).collect();
+            desc.materials.iter().map(|m| Entry::new(c.material(&m.kind), c.relief(m))).collect();
         c.check_mixes(&mut entries);
         let (normal_maps, coat_depth_limit) = (c.normal_maps, c.coat_depth_limit);
         let coats: Vec<Coat> = c.coats.par_iter().map(CoatPlan::make).collect();

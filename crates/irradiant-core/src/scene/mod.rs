@@ -181,12 +181,16 @@ impl Scene {
     }
 
     /// How a hit looks to textures. At the first hit the camera ray's differentials say how far apart neighbouring
-    /// pixels' hits are; elsewhere it is estimated from the distance to the camera.
+    /// pixels' hits are; elsewhere it is estimated from the distance to the camera. Without a footprint where nobody will
+    /// ask for it: at materials without textures, but for what the camera sees if there are layers.
     #[inline]
     pub fn texture_context(&self, at: &Interaction, camera_ray: Option<&CameraRay>) -> TextureContext {
+        let shown = camera_ray.is_some() && self.layers.channels() > 0;
         match &self.footprint {
-            None => TextureContext::point(at),
-            Some(estimator) => estimator.texture_context(at, camera_ray),
+            Some(estimator) if shown || self.materials.is_textured(at.material) => {
+                estimator.texture_context(at, camera_ray)
+            }
+            _ => TextureContext::point(at),
         }
     }
 

@@ -71,7 +71,21 @@ pub enum SpectrumValue {
     Node(SpectrumNodeId),
 }
 
+impl SpectrumValue {
+    /// Whether it comes from a texture.
+    #[inline]
+    pub fn is_textured(self) -> bool {
+        matches!(self, Self::Node(_))
+    }
+}
+
 impl FloatValue {
+    /// Whether it comes from a texture.
+    #[inline]
+    pub fn is_textured(self) -> bool {
+        matches!(self, Self::Node(_))
+    }
+
     /// The number, if it is the same everywhere.
     #[inline]
     pub fn as_constant(self) -> Option<f32> {

@@ -118,8 +118,8 @@ fn interleave(planes: &[&FlatSamples], pixels: usize) -> Pixels {
 }
 
 fn scatter<T>(samples: &mut [T], channel: usize, count: usize, plane: impl Iterator<Item = T>) {
-    for (sample, value) in samples.iter_mut().skip(channel).step_by(count).zip(plane) {
-        *sample = value;
+    for (pixel, value) in samples.chunks_exact_mut(count).zip(plane) {
+        pixel[channel] = value;
     }
 }
 

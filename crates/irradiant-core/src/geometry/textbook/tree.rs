@@ -237,7 +237,7 @@ fn gather<T: Number>(geometry: &Geometry, group: u32, through: Option<u32>, foun
         Motion::Still(affine) => Some(*affine),
         Motion::Moving(_) => None,
     });
-    for range in &group.ranges {
+    for range in group.ranges.iter() {
         let mesh = &shapes.meshes[range.mesh as usize];
         let info = &shapes.infos[shapes.mesh_shapes[range.mesh as usize] as usize];
         // Alpha inside of instances is asked in another space.
