@@ -4,9 +4,9 @@
 use crate::integrator::{RenderStats, WorkUnit};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
+use irradiant_core::geometry::Hit;
 use irradiant_core::sampler::SampleStream;
 use irradiant_core::scene::Scene;
-use irradiant_core::geometry::Hit;
 use irradiant_math::{Point2, Ray};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
@@ -130,13 +130,7 @@ fn add_sample(
     tile: &mut FilmTile,
     layers: &mut [f32],
     stats: &mut RenderStats,
-    radiance: &mut impl FnMut(
-        &CameraSample,
-        &CameraRay,
-        &mut Wavelengths,
-        &mut [f32],
-        &mut RenderStats,
-    ) -> SampledSpectrum,
+    radiance: &mut impl FnMut(&CameraSample, &CameraRay, &mut Wavelengths, &mut [f32], &mut RenderStats) -> SampledSpectrum,
 ) {
     stats.paths += 1;
     layers.fill(0.0);

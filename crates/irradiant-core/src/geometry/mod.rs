@@ -338,7 +338,11 @@ impl Geometry {
             + size_of_val(&s.cylinders[..])
             + size_of_val(&s.instances[..])
             + size_of_val(&s.infos[..])
-            + self.groups.iter().map(|g| g.tree.memory_bytes() + g.ranges.memory_bytes() + size_of_val(&g.users[..])).sum::<usize>()
+            + self
+                .groups
+                .iter()
+                .map(|g| g.tree.memory_bytes() + g.ranges.memory_bytes() + size_of_val(&g.users[..]))
+                .sum::<usize>()
             + self.emitters.iter().map(|e| size_of_val(e) + e.geometry.memory_bytes()).sum::<usize>()
     }
 }
