@@ -183,6 +183,22 @@ mod tests {
         Filter::new(&FilterDesc { kind, x_radius: r, y_radius: r, span: Span::NONE })
     }
 
+    // The guided search is the plain one: at, below and above every step of the distribution function.
+    #[test]
+    fn cells_are_found_as_by_bisection() {
+        for f in [(|x: f32| exp(-2.0 * x * x)) as fn(f32) -> f32, |x| if x < 0.3 { 0.0 } else { 1.0 }, |x| x, sinc] {
+            let profile = Profile::new(4.0, f);
+            let ends = profile.cdf.iter().flat_map(|&c| [c.next_down(), c, c.next_up()]);
+            for u in ends.filter(|u| (0.0..1.0).contains(u)) {
+                let cell = profile.cdf.partition_point(|c| *c <= u).clamp(1, CELLS) - 1;
+                let (x, weight) = profile.sample(u);
+                assert_eq!(weight, profile.weight[cell]);
+                let place = (x / profile.radius + 1.0) * (0.5 * CELLS as f32);
+                assert!((cell as f32 - 1e-3..=cell as f32 + 1.001).contains(&place), "{u} {cell} {place}");
+            }
+        }
+    }
+
     /// One dimension by a regular grid of u; the other's weight is divided out. The grid's error is about 1e-3.
     #[test]
     fn weights_have_mean_one_and_moments_match_quadrature() {

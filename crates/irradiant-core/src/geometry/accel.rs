@@ -362,3 +362,26 @@ impl<A> Clone for GroupLeaves<'_, A> {
 }
 
 impl<A> Copy for GroupLeaves<'_, A> {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Meshes of one triangle, of none, of many, and ends that fall on the guide's entries.
+    #[test]
+    fn every_triangle_is_found_in_its_mesh() {
+        for sizes in [&[1u32][..], &[0, 3, 0, 0, 61, 64, 1, 1, 1, 200, 0], &[64, 64, 64], &[1; 300], &[1000, 7]] {
+            let (mut first, mut ranges, mut expected) = (0, Vec::new(), Vec::new());
+            for (mesh, &size) in sizes.iter().enumerate() {
+                ranges.push(MeshRange { first, mesh: mesh as u32 });
+                expected.extend((0..size).map(|i| (mesh as u32, first + i)));
+                first += size;
+            }
+            let ranges = MeshRanges::new(ranges, first);
+            for (mesh, triangle) in expected {
+                assert_eq!(ranges.of(triangle).mesh, mesh, "{sizes:?} {triangle}");
+            }
+        }
+        assert_eq!(MeshRanges::new(Vec::new(), 0).iter().count(), 0);
+    }
+}
