@@ -199,9 +199,11 @@ impl RadianceImage {
         (0..self.width * self.height).map(|i| self.pixels.at(i))
     }
 
-    /// The means of the channels of the pixels of row `y`, in order; `means` is as long as a row.
-    pub(super) fn row_means(&self, y: usize, means: &mut [f32]) {
-        let row = y * self.width..(y + 1) * self.width;
+    /// The mean of the channels of each of `means.len()` pixels of row `y` from column `x` on.
+    #[inline]
+    pub(super) fn means(&self, x: usize, y: usize, means: &mut [f32]) {
+        let first = y * self.width + x;
+        let row = first..first + means.len();
         let mean = |[r, g, b]: [f32; 3]| (r + g + b) * (1.0 / 3.0);
         match &self.pixels {
             Pixels::Half(pixels) => {

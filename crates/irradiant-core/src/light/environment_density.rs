@@ -71,7 +71,7 @@ impl PixelDensity {
         let threshold = if compensated {
             let mut sum = 0.0;
             for y in 0..height {
-                image.row_means(y, &mut row);
+                image.means(0, y, &mut row);
                 sum += row.iter().map(|&mean| f64::from(mean)).sum::<f64>();
             }
             (sum / count) as f32
@@ -93,7 +93,7 @@ impl PixelDensity {
         let mut row_sums = Vec::with_capacity(height);
         let mut run_sums = vec![0f64; runs];
         for y in 0..height {
-            image.row_means(y, &mut row);
+            image.means(0, y, &mut row);
             for (sum, run) in run_sums.iter_mut().zip(row.chunks(RUN)) {
                 *sum = run.iter().map(|&mean| f64::from(density.weight_of_mean(mean))).sum();
             }
@@ -152,13 +152,17 @@ impl PixelDensity {
         let u_run = if end > start { ((u.x - start) / (end - start)).clamp(0.0, ONE_MINUS_EPSILON) } else { 0.0 };
         let first = (line * LINE + place) * RUN;
         let pixels = image.width().saturating_sub(first).min(RUN);
+        if pixels == 0 {
+            return None;
+        }
         // Sums up to and with each pixel; those past the row's end weigh nothing.
+        let mut weights = [0.0; RUN];
+        image.means(first, y, &mut weights[..pixels]);
+        weights[..pixels].iter_mut().for_each(|mean| *mean = self.weight_of_mean(*mean));
         let mut upto = [0.0; RUN];
         let mut sum = 0.0;
-        for (i, upto) in upto.iter_mut().enumerate() {
-            if i < pixels {
-                sum += self.weight(image.pixel(first + i, y));
-            }
+        for (upto, weight) in upto.iter_mut().zip(weights) {
+            sum += weight;
             *upto = sum;
         }
         let target = u_run * sum;
@@ -169,8 +173,7 @@ impl PixelDensity {
         if i >= pixels {
             return None;
         }
-        let rgb = image.pixel(first + i, y);
-        let weight = self.weight(rgb);
+        let (rgb, weight) = (image.pixel(first + i, y), weights[i]);
         if !(weight > 0.0) {
             return None;
         }
