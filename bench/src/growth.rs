@@ -69,12 +69,12 @@ fn per_ray(rays: &[Ray], trace: impl Fn(&[Ray], &mut [f32])) -> f64 {
     best / rays.len() as f64 * 1e9
 }
 
-fn sizes(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Size>, String> {
+fn sizes(largest: usize, setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Size>, String> {
     let (libraries, lacking) = rays::libraries(setting);
     missing.extend(lacking);
     let mut found = Vec::new();
     let embrees: Vec<Embree> = libraries.iter().filter_map(|p| Embree::load(p).ok()).collect();
-    for n in [71, 224, 708, 2237] {
+    for n in [71, 224, 708, 2237].into_iter().filter(|n| 2 * n * (n - 1) <= largest + largest / 100) {
         let subject = sets::displaced(n);
         let geometry = &subject.geometry;
         let tree = on_threads(1, || ours::Tree::build(geometry))?;
@@ -96,10 +96,10 @@ fn sizes(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Size>, Stri
     Ok(found)
 }
 
-fn lamps(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Lamps>, String> {
+fn lamps(largest: usize, setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Lamps>, String> {
     const SPP: u32 = 16;
     let mut found = Vec::new();
-    for count in [1, 10, 100, 1_000, 10_000, 100_000] {
+    for count in [1, 10, 100, 1_000, 10_000, 100_000].into_iter().filter(|&n| n <= largest) {
         let scene = scene::hall_with_lamps(count);
         let own = Setting { work: setting.work.join(format!("lamps-{count}")), ..setting.clone() };
         let folder = write_scene(&scene, &own.work)?;
@@ -138,12 +138,12 @@ fn lamps(setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Lamps>, Str
     Ok(found)
 }
 
-/// Measures and prints as it goes.
-pub fn run(setting: &Setting) -> Result<Report, String> {
+/// Measures up to so many triangles, and up to a hundredth of it lamps, and prints as it goes.
+pub fn run(largest: usize, setting: &Setting) -> Result<Report, String> {
     let machine = Machine::here(&setting.repository, setting.given);
     let mut missing = Vec::new();
-    let sizes = sizes(setting, &mut missing)?;
-    let lamps = lamps(setting, &mut missing)?;
+    let sizes = sizes(largest, setting, &mut missing)?;
+    let lamps = lamps(largest / 100, setting, &mut missing)?;
     missing.sort();
     missing.dedup();
     Ok(Report { machine, sizes, lamps, missing })

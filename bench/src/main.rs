@@ -110,9 +110,16 @@ enum What {
         /// The curve goes on to this number of samples per pixel
         #[arg(long, default_value_t = 64)]
         largest_spp: u32,
+        /// Width and height are divided by this, to try the experiment out
+        #[arg(long, default_value_t = 1)]
+        shrink: u32,
     },
     /// How cost grows with triangles and lamps
-    Growth,
+    Growth {
+        /// The most triangles; lamps go up to a hundredth of it
+        #[arg(long, default_value_t = 10_000_000)]
+        largest: usize,
+    },
     /// Write the page of results from the data
     Page,
     /// Everything, and the page
@@ -174,8 +181,7 @@ fn setting(places: &Places) -> Result<Setting, String> {
 fn run(cli: &Cli) -> Result<(), String> {
     if let What::Install { python } = &cli.what {
         let folder = cli.places.peers.as_deref().ok_or("where to? say --peers FOLDER, outside of the repository")?;
-        peers::install(&absolute(folder)?, python);
-        return Ok(());
+        return peers::install(&absolute(folder)?, python);
     }
     let setting = setting(&cli.places)?;
     let pictures = |scenes: &[String], amount: &pictures::Amount| -> Result<(), String> {
@@ -189,34 +195,33 @@ fn run(cli: &Cli) -> Result<(), String> {
     let rays = |passes: usize, width: usize| {
         write_json(&setting.results.join("rays.json"), &rays::run(passes.max(1), width, &setting)?)
     };
-    let street = |spp: u32, largest: u32| {
-        write_json(&setting.results.join("street.json"), &street::run(spp, largest, &setting)?)
-    };
-    let growth = || write_json(&setting.results.join("growth.json"), &growth::run(&setting)?);
+    let street =
+        |amount: &street::Amount| write_json(&setting.results.join("street.json"), &street::run(amount, &setting)?);
+    let growth = |largest| write_json(&setting.results.join("growth.json"), &growth::run(largest, &setting)?);
     match &cli.what {
         What::Install { .. } => return Ok(()),
         What::Pictures { scenes, spp, seeds, reference_spp } => {
             pictures(scenes, &pictures::Amount { spp: *spp, seeds: *seeds, reference_spp: *reference_spp })?;
         }
         What::Rays { passes, width } => rays(*passes, *width)?,
-        What::Street { reference_spp, largest_spp } => street(*reference_spp, *largest_spp)?,
-        What::Growth => growth()?,
+        What::Street { reference_spp, largest_spp, shrink } => {
+            let (reference_spp, largest_spp, shrink) = (*reference_spp, *largest_spp, (*shrink).max(1));
+            street(&street::Amount { reference_spp, largest_spp, shrink })?;
+        }
+        What::Growth { largest } => growth(*largest)?,
         What::Page => {}
         What::All { quick } => {
             let all = scene::PICTURES.map(String::from);
             let (spp, seeds, reference_spp) = if *quick { (16, 2, 128) } else { (64, 4, 1024) };
             pictures(&all, &pictures::Amount { spp, seeds, reference_spp })?;
-            if *quick {
-                street(16, 16)?
-            } else {
-                street(128, 64)?
-            }
+            let (reference_spp, largest_spp, shrink) = if *quick { (64, 32, 4) } else { (128, 64, 1) };
+            street(&street::Amount { reference_spp, largest_spp, shrink })?;
             if *quick {
                 rays(3, 256)?
             } else {
                 rays(5, 1024)?
             }
-            growth()?;
+            growth(if *quick { 1_000_000 } else { 10_000_000 })?;
         }
     }
     page::write(&setting.results)

@@ -20,7 +20,7 @@ pub const PEERS: [Peer; 4] = [
     Peer { folder: "mitsuba", packages: &["mitsuba==3.9.1", "numpy==2.4.6"], debian: &["libllvm19"] },
     Peer {
         folder: "cycles",
-        packages: &["bpy==5.0.1", "numpy"],
+        packages: &["bpy==5.0.1", "numpy==1.26.4"],
         debian: &[
             "libxxf86vm1",
             "libxi6",
@@ -36,8 +36,10 @@ pub const PEERS: [Peer; 4] = [
     Peer { folder: "embree", packages: &["embreex==4.4.0.post1", "numpy==2.4.6"], debian: &["libembree3-3"] },
 ];
 
-/// Installs what is missing into `folder`; says what failed and goes on. Debian's packages need root and are only named.
-pub fn install(folder: &Path, python: &str) {
+/// Installs what is missing into `folder`; says what failed and goes on, and fails at the end if something did. Debian's packages
+/// need root and are only named.
+pub fn install(folder: &Path, python: &str) -> Result<(), String> {
+    let mut failed = Vec::new();
     for peer in &PEERS {
         let home = folder.join(peer.folder);
         let pip = home.join("bin/pip");
@@ -45,12 +47,16 @@ pub fn install(folder: &Path, python: &str) {
             pip.exists() || Command::new(python).args(["-m", "venv"]).arg(&home).status().is_ok_and(|s| s.success());
         let installed = made
             && Command::new(&pip).args(["install", "--quiet"]).args(peer.packages).status().is_ok_and(|s| s.success());
+        if !installed {
+            failed.push(peer.folder);
+        }
         let result = if installed { "installed" } else { "FAILED" };
         println!("{result}: {} into {}", peer.packages.join(" "), home.display());
         if !peer.debian.is_empty() {
             println!("  it needs Debian's {}", peer.debian.join(" "));
         }
     }
+    if failed.is_empty() { Ok(()) } else { Err(format!("not installed: {}", failed.join(", "))) }
 }
 
 /// Irradiant on the scene of a folder.

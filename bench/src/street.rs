@@ -9,6 +9,17 @@ use crate::pictures::{reference, write_scene};
 use crate::scene;
 use serde::{Deserialize, Serialize};
 
+/// How much to render.
+#[derive(Clone, Copy, Debug)]
+pub struct Amount {
+    /// Samples per pixel of each of the two references.
+    pub reference_spp: u32,
+    /// The curve goes on to this number of samples per pixel, and at least to 16.
+    pub largest_spp: u32,
+    /// Width and height are divided by this.
+    pub shrink: u32,
+}
+
 /// One render.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Point {
@@ -61,11 +72,18 @@ fn crossing(curve: &[(f64, f64, f64)], error: f64) -> Option<(f64, f64)> {
     Some((between(pair[0].0, pair[1].0), between(pair[0].2, pair[1].2)))
 }
 
-/// Renders up to so many samples per pixel (at least 16) and prints as it goes.
-pub fn run(reference_spp: u32, largest_spp: u32, setting: &Setting) -> Result<Report, String> {
+/// Renders and prints as it goes.
+pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
     let machine = Machine::here(&setting.repository, setting.given);
-    let scene = scene::by_name("street").ok_or("no street")?;
-    let folder = write_scene(&scene, &setting.work)?;
+    let mut scene = scene::by_name("street").ok_or("no street")?;
+    let reference_spp = amount.reference_spp;
+    // References of one size are not those of another.
+    let mut work = setting.work.clone();
+    if amount.shrink > 1 {
+        scene.resolution = scene.resolution.map(|n| n / amount.shrink);
+        work.push(format!("shrunk-{}", amount.shrink));
+    }
+    let folder = write_scene(&scene, &work)?;
     println!("street: {} triangles, {:?} pixels", scene.triangles(), scene.resolution);
     let (mut peers, missing) = peers::all(setting, &folder);
     peers.retain(|(name, _)| name == "Mitsuba llvm");
@@ -90,7 +108,7 @@ pub fn run(reference_spp: u32, largest_spp: u32, setting: &Setting) -> Result<Re
     ];
     contestants.append(&mut peers);
     let mut points = Vec::new();
-    for spp in [1, 2, 4, 8, 16, 32, 64].into_iter().filter(|&s| s <= largest_spp.max(16)) {
+    for spp in [1, 2, 4, 8, 16, 32, 64].into_iter().filter(|&s| s <= amount.largest_spp.max(16)) {
         for (name, contestant) in &mut contestants {
             if spp != 16 && name != "Irradiant rgb" {
                 continue;
