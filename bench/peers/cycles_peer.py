@@ -85,9 +85,9 @@ def material(shape, index):
     return m
 
 
-def sphere(radius):
+def sphere(radius, rings=256):
     """Cycles has no spheres for surfaces: a quarter of a million triangles. Blender's own operator takes half a minute for them."""
-    rings, segments = 256, 512
+    segments = 2 * rings
     theta = math.pi * np.arange(1, rings) / rings
     phi = 2 * math.pi * np.arange(segments) / segments
     body = np.stack([np.outer(np.sin(theta), np.cos(phi)), np.outer(np.sin(theta), np.sin(phi)),
@@ -135,7 +135,15 @@ def add(shape, index):
         made = surface(shape, index, np.stack([points[:, 0], -points[:, 2], points[:, 1]], -1), triangles)
     else:
         s = shape["geometry"]["sphere"]
-        made = lamp(shape, index, s["radius"]) if shape["emission"] else surface(shape, index, *sphere(s["radius"]))
+        if shape["emission"]:
+            # Lamps are transparent: what is behind them would shine through them in mirrors, but for a black core.
+            core = {"material": {"kind": "diffuse", "rgb": (0, 0, 0)}, "emission": None}
+            made = surface(core, index + 1000000, *sphere(0.995 * s["radius"], 64))
+            made.location = turned(s["centre"])
+            blender.collection.objects.link(made)
+            made = lamp(shape, index, s["radius"])
+        else:
+            made = surface(shape, index, *sphere(s["radius"]))
         made.location = turned(s["centre"])
     blender.collection.objects.link(made)
 

@@ -87,7 +87,7 @@ if scene.sky:
 def render(request):
     spp, depth = request["spp"], scene.max_bounces + 1
     config = lux.RenderConfig(properties({
-        "renderengine.type": "PATHCPU", "lightstrategy.type": "LOG_POWER", "sampler.type": "SOBOL", "sampler.sobol.adaptive.strength": 0.0,
+        "renderengine.type": "PATHCPU", "lightstrategy.type": "POWER", "sampler.type": "SOBOL", "sampler.sobol.adaptive.strength": 0.0,
         "renderengine.seed": request["seed"] + 1, "path.pathdepth.total": depth, "path.pathdepth.diffuse": depth, "path.pathdepth.glossy": depth,
         "path.pathdepth.specular": depth, "path.russianroulette.depth": 5, "path.clamping.variance.maxvalue": 0.0,
         "path.hybridbackforward.enable": False, "film.width": scene.width, "film.height": scene.height, "film.filter.type": "BOX",
