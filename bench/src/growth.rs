@@ -109,7 +109,7 @@ fn lamps(largest: usize, setting: &Setting, missing: &mut Vec<String>) -> Result
         let mut contestants: Contestants =
             vec![("Irradiant rgb".into(), Box::new(peers::irradiant(setting, &folder, &["--color", "rgb"])))];
         // Mitsuba takes minutes to load more.
-        if count <= 10_000 {
+        if count <= 1_000 {
             let (peers, lacking) = peers::all(setting, &folder);
             contestants.extend(peers.into_iter().filter(|(name, _)| name == "Mitsuba llvm"));
             missing.extend(lacking);

@@ -135,6 +135,11 @@ pub fn reference(name: &str, contestant: &mut dyn Contestant, spp: u32, folder: 
     Picture::mean(&pictures).ok_or_else(|| "no samples for the reference".into())
 }
 
+/// Samples per pixel of a picture, if `spp` is what the quick ones take.
+fn samples(spp: u32, slow: bool) -> u32 {
+    if slow { (spp / 4).max(1) } else { spp }
+}
+
 /// Compares on one scene and prints as it goes.
 pub fn run(scene: &Scene, amount: &Amount, setting: &Setting) -> Result<Report, String> {
     let machine = Machine::here(&setting.repository, setting.given);
@@ -169,13 +174,15 @@ pub fn run(scene: &Scene, amount: &Amount, setting: &Setting) -> Result<Report, 
     let mut pictures: Vec<Vec<Picture>> = costs.iter().map(|_| Vec::new()).collect();
     for seed in 0..amount.seeds {
         for (i, (name, contestant)) in contestants.iter_mut().enumerate() {
-            // The slowest peers are asked twice at most; their figures are far from mattering.
-            if seed >= 2 && peers::is_slow(name) {
+            // The slowest peers are asked twice at most, for a quarter of the samples; their figures are far from mattering.
+            let slow = peers::is_slow(name);
+            if seed >= 2 && slow {
                 continue;
             }
+            let spp = samples(amount.spp, slow);
             let out = folder.join(format!("{}-{seed}.pfm", name.replace(' ', "-")));
             let before = load();
-            let cost = match contestant.render(amount.spp, seed + 1, &out) {
+            let cost = match contestant.render(spp, seed + 1, &out) {
                 Ok(cost) => cost,
                 Err(why) => {
                     println!("  {name}: {why}");
@@ -184,9 +191,9 @@ pub fn run(scene: &Scene, amount: &Amount, setting: &Setting) -> Result<Report, 
             };
             let picture = Picture::read(&out)?;
             let error = truth.relative_error(&picture);
-            let rate = scene.pixels() as f64 * f64::from(amount.spp) / cost.cpu_seconds / 1e6;
+            let rate = scene.pixels() as f64 * f64::from(spp) / cost.cpu_seconds / 1e6;
             println!(
-                "  {name:18} seed {seed}: relMSE {error:.5}, {:6.2} CPU s, {rate:6.3} Mpaths/CPU s, error x time {:.5}, load {before:.1}",
+                "  {name:18} seed {seed}, {spp:3} spp: relMSE {error:.5}, {:6.2} CPU s, {rate:6.3} Mpaths/CPU s, error x time {:.5}, load {before:.1}",
                 cost.cpu_seconds,
                 error * cost.cpu_seconds
             );
@@ -203,7 +210,7 @@ pub fn run(scene: &Scene, amount: &Amount, setting: &Setting) -> Result<Report, 
             name: name.clone(),
             ours: name.starts_with("Irradiant"),
             version: contestant.version(),
-            spp: amount.spp,
+            spp: samples(amount.spp, peers::is_slow(name)),
             errors: pictures.iter().map(|p| truth.relative_error(p)).collect(),
             cpu_seconds: costs.iter().map(|(c, _)| c.cpu_seconds).collect(),
             seconds: costs.iter().map(|(c, _)| c.seconds).collect(),
