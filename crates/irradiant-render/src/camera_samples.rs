@@ -7,7 +7,7 @@ use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
 use irradiant_core::sampler::SampleStream;
 use irradiant_core::scene::Scene;
-use irradiant_math::{Point2, Ray};
+use irradiant_math::{Point2, Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
 /// A sample on its way: random numbers, wavelengths, the camera's ray.
@@ -67,15 +67,21 @@ pub fn for_each_sample(
 
 /// As [`for_each_sample`], for estimators that begin with the closest surface along the camera ray: `radiance` is told what
 /// [`Geometry::intersect`](irradiant_core::geometry::Geometry::intersect) says of it, to the bit. Many rays are traced at once.
-pub fn for_each_first_hit(
+///
+/// Two steps go before it, each taken for many samples before the next: `seek` and `approach` may ask for the memory that the
+/// step after them reads.
+pub fn for_each_first_hit<A, B>(
     scene: &Scene,
     unit: &WorkUnit,
     tile: &mut FilmTile,
     stats: &mut RenderStats,
+    seek: impl Fn(&CameraSample, Option<Hit>) -> A,
+    approach: impl Fn(A) -> B,
     mut radiance: impl FnMut(
         &CameraSample,
         &CameraRay,
         Option<Hit>,
+        B,
         &mut Wavelengths,
         &mut [f32],
         &mut RenderStats,
@@ -84,28 +90,37 @@ pub fn for_each_first_hit(
     let mut layers = vec![0f32; scene.layers.channels()];
     let mut samples: Vec<CameraSample> = Vec::with_capacity(TOGETHER);
     let mut rays: Vec<Ray> = Vec::with_capacity(TOGETHER);
+    let mut ends: Vec<f32> = Vec::with_capacity(TOGETHER);
     let mut hits = [None; TOGETHER];
-    let mut trace = |samples: &mut Vec<CameraSample>| {
+    let mut sought: Vec<A> = Vec::with_capacity(TOGETHER);
+    let mut approached: Vec<B> = Vec::with_capacity(TOGETHER);
+    let mut take = |samples: &mut Vec<CameraSample>| {
+        // Where the camera sees nothing, a ray without length stands in.
         rays.clear();
-        rays.extend(samples.iter().filter_map(|sample| sample.camera_ray.map(|camera_ray| camera_ray.ray)));
+        ends.clear();
+        for sample in samples.iter() {
+            let nothing = || (Ray::new(Point3::ZERO, Vec3::Z, 0.0), 0.0);
+            let (ray, end) = sample.camera_ray.map_or_else(nothing, |camera_ray| (camera_ray.ray, f32::INFINITY));
+            rays.push(ray);
+            ends.push(end);
+        }
         let hits = &mut hits[..rays.len()];
-        scene.geometry.intersect_batch(&rays, &[f32::INFINITY; TOGETHER][..rays.len()], &scene.alpha(), hits);
-        let mut hits = hits.iter();
-        for sample in samples.drain(..) {
-            // Asked for by those samples that have a ray only.
-            let first = sample.camera_ray.and_then(|_| hits.next().copied().flatten());
-            add_sample(scene, &sample, tile, &mut layers, stats, &mut |sample, ray, lambda, layers, stats| {
-                radiance(sample, ray, first, lambda, layers, stats)
+        scene.geometry.intersect_batch(&rays, &ends, &scene.alpha(), hits);
+        sought.extend(samples.iter().zip(hits.iter()).map(|(sample, hit)| seek(sample, *hit)));
+        approached.extend(sought.drain(..).map(&approach));
+        for ((sample, hit), approached) in samples.drain(..).zip(hits).zip(approached.drain(..)) {
+            add_sample(scene, &sample, tile, &mut layers, stats, |sample, ray, lambda, layers, stats| {
+                radiance(sample, ray, *hit, approached, lambda, layers, stats)
             });
         }
     };
     for_each_place(unit, |pixel, index| {
         samples.push(camera_sample(scene, pixel, index));
         if samples.len() == TOGETHER {
-            trace(&mut samples);
+            take(&mut samples);
         }
     });
-    trace(&mut samples);
+    take(&mut samples);
 }
 
 /// Each sample of each pixel, neighbours one after another.
@@ -130,7 +145,7 @@ fn add_sample(
     tile: &mut FilmTile,
     layers: &mut [f32],
     stats: &mut RenderStats,
-    radiance: &mut impl FnMut(&CameraSample, &CameraRay, &mut Wavelengths, &mut [f32], &mut RenderStats) -> SampledSpectrum,
+    radiance: impl FnOnce(&CameraSample, &CameraRay, &mut Wavelengths, &mut [f32], &mut RenderStats) -> SampledSpectrum,
 ) {
     stats.paths += 1;
     layers.fill(0.0);

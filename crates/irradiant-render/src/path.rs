@@ -5,7 +5,7 @@
 //! share one set of decisions whose densities do not depend on wavelength, so that no wavelength weighting is needed;
 //! a dispersive vertex ends the secondary ones.
 
-use crate::camera_samples::for_each_first_hit;
+use crate::camera_samples::{CameraSample, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use irradiant_core::bsdf::Bsdf;
@@ -14,9 +14,9 @@ use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::{Interaction, ReferencePoint};
-use irradiant_core::light::SampleMode;
+use irradiant_core::light::{PixelLine, PixelRun, SampleMode};
 use irradiant_core::light_sampler::PickedLight;
-use irradiant_core::sampler::SampleStream;
+use irradiant_core::sampler::{LightDraws, SampleStream};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point2, Ray};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
@@ -32,9 +32,36 @@ pub struct PathIntegrator {
 
 impl Integrator for PathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
-        for_each_first_hit(scene, unit, tile, stats, |sample, camera_ray, first, lambda, layers, stats| {
-            self.radiance_from(first, scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
-        });
+        // Under a sky, the first lookups of many paths are prepared together, since they wait for memory; in vain where
+        // another light is picked.
+        let sky = scene.lights.sky().map(|(_, sky)| sky);
+        let mode = SampleMode::Compensated;
+        let seek = |sample: &CameraSample, hit: Option<Hit>| -> Option<Sought> {
+            Some(match hit {
+                Some(_) => {
+                    let draws = sample.stream.light(0);
+                    Sought::Light(draws, sky?.seek(draws.uv, mode))
+                }
+                None => Sought::Escape(sky?.place(sample.camera_ray?.ray.d)),
+            })
+        };
+        let approach = |sought: Option<Sought>| match (sought, sky) {
+            (Some(Sought::Light(draws, line)), Some(sky)) => (Some((draws, sky.approach(line, mode))), None),
+            (Some(Sought::Escape(place)), _) => (None, Some(place)),
+            _ => (None, None),
+        };
+        for_each_first_hit(
+            scene,
+            unit,
+            tile,
+            stats,
+            seek,
+            approach,
+            |sample, camera_ray, hit, (light, escape), lambda, layers, stats| {
+                let first = FirstHit { hit, light, escape };
+                self.radiance_from(first, scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
+            },
+        );
     }
 
     fn limits(&self) -> Vec<Limit> {
@@ -64,6 +91,24 @@ pub const ENTRY: crate::registry::IntegratorEntry = {
     }
 };
 
+/// What a path under a sky will look up first.
+enum Sought {
+    /// A light sample at the first hit: its random numbers, and the first step to it.
+    Light(LightDraws, PixelLine),
+    /// The point of the sky that the camera sees.
+    Escape(Point2),
+}
+
+/// What is known of a path when it begins.
+struct FirstHit {
+    /// What the camera ray meets.
+    hit: Option<Hit>,
+    /// The random numbers of its first light sample, which has been prepared.
+    light: Option<(LightDraws, PixelRun)>,
+    /// What it sees of the sky if it meets nothing.
+    escape: Option<Point2>,
+}
+
 /// Where the last scattering event was, for weighing a light that the next ray meets.
 struct Previous {
     reference: ReferencePoint,
@@ -83,14 +128,15 @@ impl PathIntegrator {
         stats: &mut RenderStats,
         recorder: &mut R,
     ) -> SampledSpectrum {
-        let first = scene.geometry.intersect(&camera_ray.ray, f32::INFINITY, &scene.alpha());
+        let hit = scene.geometry.intersect(&camera_ray.ray, f32::INFINITY, &scene.alpha());
+        let first = FirstHit { hit, light: None, escape: None };
         self.radiance_from(first, scene, camera_ray, stream, lambda, layers, stats, recorder)
     }
 
-    /// As [`PathIntegrator::radiance`], if `first` is what the camera ray meets.
+    /// As [`PathIntegrator::radiance`], of a path whose beginning is known.
     fn radiance_from<R: PathRecorder>(
         &self,
-        first: Option<Hit>,
+        first: FirstHit,
         scene: &Scene,
         camera_ray: &CameraRay,
         stream: &SampleStream,
@@ -100,7 +146,7 @@ impl PathIntegrator {
         recorder: &mut R,
     ) -> SampledSpectrum {
         let mut ray = camera_ray.ray;
-        let mut met = first;
+        let mut met = first.hit;
         let mut radiance = SampledSpectrum::ZERO;
         let mut throughput = SampledSpectrum::ONE;
         let mut depth = 0;
@@ -108,7 +154,7 @@ impl PathIntegrator {
         let mut eta_scale = 1.0;
         let mut previous: Option<Previous> = None;
         let mut any_non_specular = false;
-        let mut escape_place = None;
+        let mut escape_place = first.escape;
         recorder.begin(lambda);
 
         let why = loop {
@@ -150,7 +196,11 @@ impl PathIntegrator {
 
             // Direct light: one sample of one light.
             if bsdf.flags().is_non_specular() {
-                radiance += direct_light(scene, &at, bsdf, &throughput, lambda, stream, depth, stats, recorder);
+                let (draws, run) = match first.light {
+                    Some((draws, run)) if depth == 0 => (draws, Some(run)),
+                    _ => (stream.light(depth), None),
+                };
+                radiance += direct_light(scene, &at, bsdf, &throughput, lambda, &draws, run, depth, stats, recorder);
             }
 
             // The next direction.
@@ -288,17 +338,22 @@ fn direct_light<R: PathRecorder>(
     bsdf: &Bsdf,
     throughput: &SampledSpectrum,
     lambda: &Wavelengths,
-    stream: &SampleStream,
+    draws: &LightDraws,
+    prepared: Option<PixelRun>,
     depth: u32,
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
-    let draws = stream.light(depth);
     let reference = at.reference();
     let Some(PickedLight { id: light, pmf }) = scene.light_sampler.sample(&reference, draws.pick) else {
         return SampledSpectrum::ZERO;
     };
-    let Some(sample) = scene.lights.get(light).sample(&reference, draws.uv, lambda, SampleMode::Compensated) else {
+    let mode = SampleMode::Compensated;
+    let sample = match (scene.lights.sky(), prepared) {
+        (Some((id, sky)), Some(run)) if id == light => sky.arrive(run, lambda, mode),
+        _ => scene.lights.get(light).sample(&reference, draws.uv, lambda, mode),
+    };
+    let Some(sample) = sample else {
         return SampledSpectrum::ZERO;
     };
     let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);

@@ -173,9 +173,15 @@ impl Lights {
     /// before the ray is traced, so that the memory is there afterwards. `None` when there is no such image.
     #[inline]
     pub fn place_of_escape(&self, direction: Vec3) -> Option<Point2> {
+        self.sky().map(|(_, light)| light.place(direction))
+    }
+
+    /// The one environment there is, if it is an image: its samples can be drawn in steps.
+    #[inline]
+    pub fn sky(&self) -> Option<(LightId, &ImageInfiniteLight)> {
         match self.environments[..] {
             [only] => match &self.list[only.0 as usize] {
-                Light::ImageInfinite(light) => Some(light.place(direction)),
+                Light::ImageInfinite(light) => Some((only, light)),
                 _ => None,
             },
             _ => None,

@@ -266,6 +266,26 @@ impl RadianceImage {
         }
     }
 
+    /// Asks for the memory of `count` pixels of row `y` from column `x` on, at most three cache lines.
+    #[inline]
+    pub(super) fn prefetch_run(&self, x: usize, y: usize, count: usize) {
+        let end = self.width * self.height - 1;
+        let (first, middle, last) =
+            (y * self.width + x, y * self.width + x + count / 2, y * self.width + x + count - 1);
+        let places = [first.min(end), middle.min(end), last.min(end)];
+        match &self.pixels {
+            Pixels::Half(pixels) => {
+                irradiant_bvh::prefetch_read(&pixels[places[0]]);
+                irradiant_bvh::prefetch_read(&pixels[places[2]]);
+            }
+            Pixels::Single(pixels) => {
+                for place in places {
+                    irradiant_bvh::prefetch_read(&pixels[place]);
+                }
+            }
+        }
+    }
+
     /// Bilinear between pixel centres, the border repeated outwards.
     #[inline]
     pub fn bilinear(&self, uv: Point2) -> [f32; 3] {

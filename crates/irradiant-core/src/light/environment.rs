@@ -13,7 +13,7 @@
 //! (Karlik et al. 2019, "MIS compensation", as in pbrt-v4), and a uniform environment is left to it altogether.
 
 use super::emission::RadianceImage;
-use super::environment_density::PixelDensity;
+use super::environment_density::{PixelDensity, PixelLine, PixelRun, PixelSample};
 use super::orientation::Orientation;
 use super::{Emission, EmittedRay, LightSample, LightTarget, SampleMode, SceneSphere};
 use irradiant_math::{Normal3, Point2, Vec3, warp};
@@ -126,16 +126,43 @@ impl ImageInfiniteLight {
     /// See [`super::Light::sample`].
     #[inline]
     pub fn sample(&self, u: Point2, lambda: &Wavelengths, mode: SampleMode) -> Option<LightSample> {
-        let s = self.density(mode).sample(&self.image, u)?;
+        Some(self.light_from(self.density(mode).sample(&self.image, u)?, lambda))
+    }
+
+    /// The first of three steps to what [`ImageInfiniteLight::sample`] gives for `u`. Each asks for the memory that the next one
+    /// reads: take each for many samples before the next, and no one waits.
+    #[inline]
+    pub fn seek(&self, u: Point2, mode: SampleMode) -> PixelLine {
+        let line = self.density(mode).seek(u);
+        self.density(mode).prefetch_line(&line);
+        line
+    }
+
+    /// The second step.
+    #[inline]
+    pub fn approach(&self, line: PixelLine, mode: SampleMode) -> PixelRun {
+        let run = self.density(mode).approach(line);
+        self.density(mode).prefetch_run(&self.image, &run);
+        run
+    }
+
+    /// The last.
+    #[inline]
+    pub fn arrive(&self, run: PixelRun, lambda: &Wavelengths, mode: SampleMode) -> Option<LightSample> {
+        Some(self.light_from(self.density(mode).arrive(&self.image, run)?, lambda))
+    }
+
+    #[inline]
+    fn light_from(&self, s: PixelSample, lambda: &Wavelengths) -> LightSample {
         let w = warp::equal_area_square_to_sphere(s.uv);
-        Some(LightSample {
+        LightSample {
             radiance: self.radiance(s.rgb, lambda),
             wi: self.orientation.to_render(w),
             pdf: s.pdf / (4.0 * PI * self.orientation.stretch(w)),
             target: LightTarget::Infinite,
             is_delta: false,
             alpha: None,
-        })
+        }
     }
 
     /// The point of the image that a ray in this direction sees, whose memory is asked for: looking up a sky is waiting.
