@@ -20,6 +20,9 @@ pub enum Exit {
     Bug = 70,
     /// Writing failed.
     Output = 74,
+    /// Stopped by Ctrl-C or a termination signal before it was done, as shells number it (128 + SIGINT). What was written
+    /// is a picture, not a checkpoint that a later run could take up: 75 ("requeue me, nothing is lost") would be a lie.
+    Interrupted = 130,
 }
 
 impl Exit {

@@ -80,12 +80,12 @@ fn parse_self_intersection(text: &str) -> Result<SelfIntersection, String> {
 /// Loads, renders, writes.
 pub fn run(arguments: &RenderArguments) -> Exit {
     match render(arguments) {
-        Ok(()) => Exit::Ok,
+        Ok(exit) => exit,
         Err(error) => Exit::of(&error),
     }
 }
 
-fn render(arguments: &RenderArguments) -> Result<(), Error> {
+fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     let mut clock = Clock::start();
     let file = match &arguments.scene {
         Some(path) => irradiant::load(path)?,
@@ -124,7 +124,7 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
         );
     }
 
-    let Watched { rendering, worker_panicked } = watch(&job, arguments.quiet);
+    let Watched { rendering, interrupted, worker_panicked } = watch(&job, arguments.quiet);
     clock.lap("render");
     // One that cannot be written must not cost the others.
     let mut failed = None;
@@ -197,7 +197,8 @@ fn render(arguments: &RenderArguments) -> Result<(), Error> {
     if worker_panicked {
         return Err(Error::Internal("a render thread stopped; the picture was written without its last tile".into()));
     }
-    Ok(())
+    // A limit of time is a wish that was fulfilled; an interrupt leaves less than was wished for.
+    Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
 }
 
 fn job_threads(arguments: &RenderArguments) -> usize {
@@ -210,6 +211,8 @@ fn job_threads(arguments: &RenderArguments) -> usize {
 /// What rendering left.
 struct Watched {
     rendering: Rendering,
+    /// Ctrl-C or a termination signal ended it.
+    interrupted: bool,
     /// A bug: the picture lacks what that worker had under way.
     worker_panicked: bool,
 }
@@ -221,7 +224,7 @@ fn watch(job: &Job, quiet: bool) -> Watched {
     // A handler that cannot be set (there is one already, in an embedding process) only means no early picture.
     let _ = ctrlc::set_handler(move || {
         if counter.fetch_add(1, Ordering::Relaxed) > 0 {
-            std::process::exit(130);
+            std::process::exit(Exit::Interrupted as i32);
         }
     });
     let session = job.start();
@@ -249,7 +252,10 @@ fn watch(job: &Job, quiet: bool) -> Watched {
     }
     reporter.finish();
     let finished = session.wait();
-    Watched { rendering: job.rendering(finished.film, finished.stats), worker_panicked: finished.worker_panicked }
+    let rendering = job.rendering(finished.film, finished.stats);
+    // One that came when all samples were taken cost nothing.
+    let interrupted = interrupted && rendering.header.samples_taken.is_some();
+    Watched { rendering, interrupted, worker_panicked: finished.worker_panicked }
 }
 
 /// Where to write: as asked for, else the scene's own name in the current directory, EXR and PNG.

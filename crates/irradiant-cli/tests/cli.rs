@@ -357,15 +357,15 @@ fn images_are_converted() {
 fn a_time_limit_ends_a_long_render() {
     let folder = Folder::new("time");
     let output = folder.run(&["render", "--resolution", "64x64", "--spp", "1000000", "--time", "300ms", "-o", "x.exr"]);
+    // What can be had in that time is what was wished for.
     assert_eq!(code(&output), 0, "{}", stderr(&output));
-    assert!(folder.0.join("x.exr").exists());
+    let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
+    assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
 }
 
-/// Waits for a render to be under way, interrupts it as Ctrl-C does.
+/// Waits for a render to be under way, stops it as Ctrl-C (`INT`) or a scheduler (`TERM`) does.
 #[cfg(unix)]
-#[test]
-fn an_interrupt_writes_the_picture_so_far() {
-    let folder = Folder::new("interrupt");
+fn stopped_render(folder: &Folder, signals: &[&str]) -> (i32, String) {
     let mut child = folder
         .command(&["render", "--resolution", "64x64", "--spp", "10000000", "-o", "x.exr"])
         .stderr(Stdio::piped())
@@ -375,14 +375,27 @@ fn an_interrupt_writes_the_picture_so_far() {
     let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().expect("piped")));
     lines.next().expect("a line").expect("text");
     std::thread::sleep(std::time::Duration::from_millis(500));
-    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(interrupted.expect("kill runs").success());
-    lines.for_each(drop);
-    let status = child.wait().expect("ends");
-    assert!(status.success(), "{status}");
-    // The header says how many samples the pixels really have.
-    let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
-    assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
+    for signal in signals {
+        let sent = Command::new("kill").args([signal, &child.id().to_string()[..]]).status();
+        assert!(sent.expect("kill runs").success());
+    }
+    let said: Vec<String> = lines.map_while(Result::ok).collect();
+    // No status (it was killed) is no code of ours.
+    (child.wait().expect("ends").code().unwrap_or(-1), said.join("\n"))
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_writes_the_picture_so_far_and_ends_with_130() {
+    for signal in ["-INT", "-TERM"] {
+        let folder = Folder::new("interrupt");
+        let (code, said) = stopped_render(&folder, &[signal]);
+        assert_eq!(code, 130, "{signal}: {said}");
+        assert!(said.contains("writing the picture so far") && said.contains("stopped early"), "{said}");
+        // The header says how many samples the pixels really have.
+        let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
+        assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
+    }
 }
 
 #[test]

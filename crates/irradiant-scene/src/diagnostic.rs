@@ -1,6 +1,7 @@
 //! Complaints that speak to the author: what was found, where, what was expected, what to try.
 
 use crate::span::{Sources, Span};
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// How bad it is.
@@ -95,10 +96,10 @@ impl Diagnostic {
             Severity::Warning => "warning",
             Severity::Error => "error",
         };
-        let mut out = format!("{word}[{}]: {}\n", self.code, self.message);
+        let mut out = format!("{word}[{}]: {}\n", self.code, printable(&self.message));
         for (span, text) in &self.labels {
             let Some((line, column, source)) = sources.locate(*span) else { continue };
-            let name = sources.get(span.file).map_or("", |s| &s.name);
+            let name = printable(sources.get(span.file).map_or("", |s| &s.name));
             let (shown, caret_at) = excerpt(&source, column);
             let width = (span.end.saturating_sub(span.start) as usize)
                 .min(shown.chars().count().saturating_sub(caret_at))
@@ -107,18 +108,41 @@ impl Diagnostic {
             let _ = writeln!(out, "{:gutter$}--> {name}:{line}:{column}", "");
             let _ = writeln!(out, "{:gutter$} |", "");
             let _ = writeln!(out, "{line} | {shown}");
-            let _ = writeln!(out, "{:gutter$} | {:caret_at$}{} {text}", "", "", "^".repeat(width));
+            let _ =
+                writeln!(out, "{:gutter$} | {:caret_at$}{} {text}", "", "", "^".repeat(width), text = printable(text));
         }
         if let Some(help) = &self.help {
-            let _ = writeln!(out, "  = help: {help}");
+            let _ = writeln!(out, "  = help: {}", printable(help));
         }
         out
     }
 }
 
+/// What a terminal would obey instead of showing it: control characters, and those that turn the direction of writing.
+fn is_command(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// Words of a file as they may go to a terminal: what it would obey is spelt out (`\u{1b}`); lines and tabs stay.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let spelt_out = |c: char| is_command(c) && !matches!(c, '\n' | '\t');
+    if !text.contains(spelt_out) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if spelt_out(c) {
+            out.extend(c.escape_unicode());
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
 /// A window of at most 100 characters of a (possibly huge) line around a column, and the caret's place in it.
 fn excerpt(line: &str, column: usize) -> (String, usize) {
-    let chars: Vec<char> = line.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let chars: Vec<char> = line.chars().map(|c| if is_command(c) { ' ' } else { c }).collect();
     let at = column - 1;
     let start = if chars.len() <= 100 { 0 } else { at.saturating_sub(40) };
     let end = chars.len().min(start + 100);
@@ -153,6 +177,12 @@ impl Diagnostics {
         other.list.into_iter().for_each(|d| self.push(d));
     }
 
+    /// Puts the complaints in the order in which one reads files: by file, line and column, those without a place
+    /// after them, notes last.
+    pub fn sort(&mut self) {
+        self.list.sort_by_key(|d| (d.severity == Severity::Note, d.labels[0].0.file, d.labels[0].0.start));
+    }
+
     /// Number of errors.
     pub fn error_count(&self) -> usize {
         self.list.iter().filter(|d| d.severity == Severity::Error).count()
@@ -163,7 +193,7 @@ impl Diagnostics {
         self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// The complaints, in the order they came up.
+    /// The complaints, in the order they came up until they are sorted.
     pub fn iter(&self) -> impl Iterator<Item = &Diagnostic> {
         self.list.iter()
     }
@@ -233,6 +263,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::FileId;
 
     #[test]
     fn a_diagnostic_shows_the_line_and_the_caret() {
@@ -244,6 +275,35 @@ mod tests {
         assert!(text.contains("--> s.pbrt:1:7"), "{text}");
         assert!(text.contains("^^^^^^^"), "{text}");
         assert!(text.contains("did you mean \"sphere\"?"));
+    }
+
+    #[test]
+    fn a_file_cannot_command_the_terminal() {
+        let mut sources = Sources::default();
+        let bytes = "Shape \"\u{1b}[2J\u{7}\u{202e}\u{9b}x\"\n";
+        let file = sources.add("s\u{1b}]0;.pbrt", bytes.as_bytes());
+        let word = "unknown shape \"\u{1b}[2J\u{7}\u{202e}\u{9b}x\"";
+        let text = Diagnostic::error("E0201", word, Span { file, start: 6, end: 13 })
+            .label("not\ra shape")
+            .help("\u{8}")
+            .render(&sources);
+        assert!(!text.contains(|c: char| c != '\n' && is_command(c)), "{text:?}");
+        assert!(text.contains(r#"unknown shape "\u{1b}[2J\u{7}\u{202e}\u{9b}x""#), "{text}");
+        assert!(matches!(printable("zw\u{f6}lf\tx\n"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn complaints_are_read_from_top_to_bottom() {
+        let at = |file, start| Span { file: FileId(file), start, end: start };
+        let mut d = Diagnostics::default();
+        d.push(Diagnostic::new(Severity::Note, "N", "", at(0, 0)));
+        d.push(Diagnostic::error("E4", "", Span::NONE));
+        for (code, span) in [("E3", at(1, 0)), ("E2", at(0, 9)), ("E1", at(0, 3))] {
+            d.push(Diagnostic::error(code, "", span));
+        }
+        d.push(Diagnostic::warning("W", "", at(0, 4)));
+        d.sort();
+        assert_eq!(d.iter().map(|d| d.code).collect::<Vec<_>>(), ["E1", "W", "E2", "E3", "E4", "N"]);
     }
 
     #[test]

@@ -13,5 +13,5 @@ pub mod span;
 
 pub use assets::{AssetError, Assets};
 pub use desc::SceneDesc;
-pub use diagnostic::{Diagnostic, Diagnostics, Severity};
+pub use diagnostic::{Diagnostic, Diagnostics, Severity, printable};
 pub use span::{FileId, Sources, Span, Spanned};

@@ -80,6 +80,7 @@ fn read(name: &str, text: Arc<[u8]>, files: FileAssets, folder: &Path) -> Result
     if report.diagnostics.has_errors() {
         let more = errors_of_compiling(parsed.desc, &report);
         report.diagnostics.extend(more);
+        report.diagnostics.sort();
         return Err(Error::Scene(Box::new(report)));
     }
     Ok(SceneFile { name: name.to_owned(), desc: parsed.desc, report, unlimited_depth: false, assets, main_hash })

@@ -62,6 +62,7 @@ impl Job {
         let mut report = file.report.clone();
         let compiled = Scene::compile(&file.desc, &file.assets, &options);
         report.diagnostics.extend(compiled.diagnostics);
+        report.diagnostics.sort();
         if settings.integrator.is_some() {
             // The scene's own, and what stands in for it, are not asked.
             report.diagnostics.forget_not_honoured("integrator ");

@@ -210,6 +210,11 @@ pub const CODES: &[Code] = &[
         "A subdivided mesh would be too large.",
         "WorldBegin Shape \"loopsubdiv\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"integer levels\" 30",
     ),
+    code(
+        "E1010",
+        "The scene, or a file that it includes, is a picture, a mesh, XML, JSON or otherwise no pbrt text.",
+        "Include \"not-a.pbrt\"",
+    ),
     code("E1101", "A directive of pbrt-v3.", "WorldBegin WorldEnd"),
     code("E1102", "A name of pbrt-v3.", "WorldBegin Material \"matte\""),
     code(
@@ -350,6 +355,7 @@ mod tests {
                 .with("this-file.pbrt", c.example.as_bytes())
                 .with("not-a.ply", &b"text"[..])
                 .with("wrong.dat", &b"1 2 3"[..])
+                .with("not-a.pbrt", &b"<scene version=\"3.0.0\"/>"[..])
                 .with("paper.bsdf", &b""[..])
                 .with("a.ptx", &b""[..])
                 .with("a.ply", crate::mesh::ply::tests::TRIANGLE.as_bytes());

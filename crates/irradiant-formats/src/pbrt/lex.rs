@@ -81,6 +81,11 @@ impl Lexer {
         scan(&self.text, &mut at)
     }
 
+    /// Goes back to a token that has been consumed.
+    pub fn back_to(&mut self, token: Token) {
+        self.at = token.start;
+    }
+
     /// Consumes the next token.
     pub fn next(&mut self) -> Token {
         scan(&self.text, &mut self.at)

@@ -5,7 +5,7 @@
 //! `params` looks parameters up by name and type. What needs no names of others is described on the spot (`settings`,
 //! `film`, `camera`, `lights`, `shapes`, `media`); `textures` and `materials` wait until all files are read, and this
 //! file ties shapes to them. `legacy` knows what pbrt-v3 called things, `stand_ins` what replaces the materials that
-//! are not rendered yet. [`codes`] explains every complaint.
+//! are not rendered yet, `other_files` recognises what is no scene at all. [`codes`] explains every complaint.
 //!
 //! Semantics and defaults are those of pbrt-v4 (its file format page, and `parser.cpp`, `scene.cpp` and the `Create`
 //! functions of its objects). Departures, all towards saying more: unknown or contradictory parameters are located
@@ -21,6 +21,7 @@ pub(crate) mod lex;
 mod lights;
 mod materials;
 mod media;
+mod other_files;
 mod params;
 mod parse;
 mod reader;
@@ -94,7 +95,7 @@ fn finish(parser: Parser<'_, '_>) -> SceneDesc {
     let mut use_medium = |name: &Spanned<String>| {
         if media.contains_key(&name.value) {
             medium_in_use.get_or_insert(name.span);
-        } else if told_media.insert(name.span) {
+        } else if told_media.insert(name.span) && !r.is_defined_wrongly(name) {
             let known: Vec<&str> = media.keys().map(String::as_str).collect();
             r.unknown("E0406", "medium", name, &known);
         }
@@ -109,7 +110,7 @@ fn finish(parser: Parser<'_, '_>) -> SceneDesc {
             MaterialUse::Named(name) => match named_materials.get(&name.value) {
                 Some(index) => MaterialRef(*index),
                 None => {
-                    if told_materials.insert(name.span) {
+                    if told_materials.insert(name.span) && !r.is_defined_wrongly(name) {
                         let known: Vec<&str> = named_materials.keys().map(String::as_str).collect();
                         r.unknown("E0401", "named material", name, &known);
                     }
@@ -144,6 +145,7 @@ fn finish(parser: Parser<'_, '_>) -> SceneDesc {
                 world_from_object: instance.world_from_object,
                 span: instance.name.span,
             }),
+            None if r.is_defined_wrongly(&instance.name) => {}
             None => {
                 let known: Vec<&str> = indices.keys().map(String::as_str).collect();
                 r.unknown("E0405", "object", &instance.name, &known);

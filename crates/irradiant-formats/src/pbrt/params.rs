@@ -128,6 +128,8 @@ pub(crate) struct Params {
     /// Of the directive and the name after it.
     pub span: Span,
     asked: RefCell<Vec<(&'static str, Vec<Type>)>>,
+    /// A parameter has been reported and left out: what seems to be missing may have been it.
+    pub incomplete: bool,
 }
 
 const SPECTRUM: [Type; 3] = [Type::Rgb, Type::Spectrum, Type::Blackbody];
@@ -141,7 +143,15 @@ impl Params {
         subject: impl Into<String>,
         span: Span,
     ) -> Self {
-        Self { own, attributes, color_space, subject: subject.into(), span, asked: RefCell::default() }
+        Self {
+            own,
+            attributes,
+            color_space,
+            subject: subject.into(),
+            span,
+            asked: RefCell::default(),
+            incomplete: false,
+        }
     }
 
     /// The parameter that counts: the last own one, then the last of the attributes.
@@ -532,9 +542,11 @@ impl Params {
         r.error_help("E0301", message, p.span, help);
     }
 
-    /// An error about this thing as a whole.
+    /// An error about this thing as a whole, unless it has been said why that is missing.
     pub fn missing(&self, r: &Reader, what: &str) {
-        r.error("E0304", format!("{} needs {what}", self.subject), self.span);
+        if !self.incomplete {
+            r.error("E0304", format!("{} needs {what}", self.subject), self.span);
+        }
     }
 }
 
@@ -555,6 +567,9 @@ fn unknown_texture(
     other_kind: &str,
     other: &BTreeMap<String, Span>,
 ) {
+    if r.is_defined_wrongly(name) {
+        return;
+    }
     if let Some(place) = all.get(&name.value) {
         r.push(
             Diagnostic::error("E0404", format!("texture \"{}\" is used before it is defined", name.value), name.span)
@@ -605,8 +620,7 @@ fn named_or_file(r: &Reader, name: &Spanned<String>) -> Option<SpectrumDesc> {
     }
     let looks_like_a_name = !name.value.contains(['.', '/', '\\']);
     let read = if looks_like_a_name && r.assets_lack(&path) {
-        let names: Vec<&str> = irradiant_spectrum::names().collect();
-        r.unknown("E0308", "spectrum", name, &names);
+        unknown_spectrum(r, name);
         None
     } else {
         r.bytes("spectrum file", name, &path, name.span).and_then(|bytes| {
@@ -618,6 +632,37 @@ fn named_or_file(r: &Reader, name: &Spanned<String>) -> Option<SpectrumDesc> {
     };
     r.spectra.borrow_mut().insert(path, read.clone());
     read.map(SpectrumDesc::Samples)
+}
+
+/// How people call what the spectra's names abbreviate.
+const SUBSTANCES: [(&str, &str); 9] = [
+    ("aluminium", "Al"),
+    ("aluminum", "Al"),
+    ("brass", "CuZn"),
+    ("copper", "Cu"),
+    ("gold", "Au"),
+    ("silver", "Ag"),
+    ("magnesium oxide", "MgO"),
+    ("magnesiumoxide", "MgO"),
+    ("titanium", "TiO2"),
+];
+
+/// An unknown spectrum: the chemist's name if the word holds the everyday one ("metal-Gold-eta"), else the nearest.
+fn unknown_spectrum(r: &Reader, name: &Spanned<String>) {
+    let word = name.value.to_lowercase();
+    let names = || irradiant_spectrum::names();
+    let Some((_, symbol)) = SUBSTANCES.iter().find(|(everyday, _)| word.contains(everyday)) else {
+        return r.unknown("E0308", "spectrum", name, &names().collect::<Vec<_>>());
+    };
+    let index = if word.ends_with('k') { "-k" } else { "-eta" };
+    let meant = format!("metal-{symbol}{index}");
+    match names().find(|n| *n == meant) {
+        Some(meant) => {
+            let help = format!("did you mean \"{meant}\"?");
+            r.error_help("E0308", format!("unknown spectrum \"{}\"", name.value), name.span, help);
+        }
+        None => r.unknown("E0308", "spectrum", name, &names().collect::<Vec<_>>()),
+    }
 }
 
 /// The numbers of a text file, with `#` comments; `Err` with the line of what is not one.

@@ -7,7 +7,7 @@ use irradiant_scene::desc::{FileDesc, MeshData};
 use irradiant_scene::diagnostic::did_you_mean;
 use irradiant_scene::{AssetError, Assets, Diagnostic, Diagnostics, FileId, Sources, Span, Spanned};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -24,6 +24,7 @@ pub(crate) struct Reader<'a> {
     pub meshes: Cache<Arc<MeshData>>,
     pub spectra: Cache<Arc<[(f32, f32)]>>,
     v3: RefCell<Option<Span>>,
+    broken: RefCell<BTreeSet<String>>,
 }
 
 impl<'a> Reader<'a> {
@@ -38,11 +39,13 @@ impl<'a> Reader<'a> {
             meshes: RefCell::default(),
             spectra: RefCell::default(),
             v3: RefCell::default(),
+            broken: RefCell::default(),
         }
     }
 
     pub fn into_parts(self) -> (Sources, Diagnostics, Vec<AssetRead>) {
         let mut diagnostics = self.diagnostics.into_inner();
+        diagnostics.sort();
         if let Some(span) = self.v3.into_inner() {
             diagnostics.push(
                 Diagnostic::new(
@@ -78,6 +81,16 @@ impl<'a> Reader<'a> {
     pub fn v3(&self, code: &'static str, message: impl Into<String>, span: Span, help: impl Into<String>) {
         self.v3.borrow_mut().get_or_insert(span);
         self.error_help(code, message, span, help);
+    }
+
+    /// Remembers a name whose definition could not be read, so that its uses are not errors too.
+    pub fn defined_wrongly(&self, name: &str) {
+        self.broken.borrow_mut().insert(name.into());
+    }
+
+    /// True for a name whose definition could not be read.
+    pub fn is_defined_wrongly(&self, name: &str) -> bool {
+        self.broken.borrow().contains(name)
     }
 
     /// An unknown word where one of `candidates` should stand.

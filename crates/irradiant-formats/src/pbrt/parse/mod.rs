@@ -5,6 +5,7 @@ mod world;
 
 use super::legacy;
 use super::lex::{Kind, Lexer, Token, parse_f64};
+use super::other_files::not_a_scene;
 use super::params::Params;
 use super::reader::Reader;
 use super::state::*;
@@ -104,6 +105,10 @@ pub(crate) struct Parser<'r, 'a> {
     active_object: Option<usize>,
     bytes_left: u64,
     told_transform_begin: bool,
+    /// A parameter of the list read last has been reported and left out.
+    refused_parameter: bool,
+    /// What belongs into the world and stands before it so far: the first, its directive, and how many there are.
+    before_world: Option<(Span, &'static str, usize)>,
     pub desc: SceneDesc,
     pub textures: Vec<PendingTexture>,
     /// Where each (class, name) was defined.
@@ -135,6 +140,8 @@ impl<'r, 'a> Parser<'r, 'a> {
             active_object: None,
             bytes_left: r.limits.max_total_bytes,
             told_transform_begin: false,
+            refused_parameter: false,
+            before_world: None,
             desc: SceneDesc::default(),
             textures: vec![],
             texture_places: BTreeMap::new(),
@@ -162,6 +169,11 @@ impl<'r, 'a> Parser<'r, 'a> {
             self.r.error("E1002", "scene texts are limited to 4 GiB", Span { file, start: 0, end: 0 });
             return;
         }
+        if let Some(looks_like) = not_a_scene(&text) {
+            let span = Span { file, start: 0, end: 0 };
+            let help = "scenes are text in the language of pbrt-v4, gzipped or not";
+            return self.r.error_help("E1010", format!("this is no pbrt scene but {looks_like}"), span, help);
+        }
         self.bytes_left = self.bytes_left.saturating_sub(text.len() as u64);
         let end = text.len() as u32;
         // A scene that includes itself does so by the name of its file, beside which it stands.
@@ -183,9 +195,17 @@ impl<'r, 'a> Parser<'r, 'a> {
             return;
         }
         if self.block == Block::Options {
-            let span = Span { file, start: end, end };
-            let help = "write WorldBegin between the camera and the shapes";
-            self.r.error_help("E0104", "the scene ends before WorldBegin", span, help);
+            match self.before_world {
+                Some((span, ..)) => {
+                    let help = "write WorldBegin above this line";
+                    self.r.error_help("E0104", "the world has no WorldBegin; it seems to begin here", span, help);
+                }
+                None => {
+                    let span = Span { file, start: end, end };
+                    let help = "write WorldBegin between the camera and the shapes";
+                    self.r.error_help("E0104", "the scene ends before WorldBegin", span, help);
+                }
+            }
         }
         while let Some(open) = self.pushed.pop() {
             self.missing_end(&open);
@@ -214,47 +234,69 @@ impl<'r, 'a> Parser<'r, 'a> {
 
     // Directives.
 
-    fn only_in(&mut self, block: Block, span: Span, word: &str) -> Parsing<()> {
-        if self.block == block {
-            return Ok(());
+    fn only_in(&mut self, block: Block, span: Span, word: &'static str) {
+        match (block, self.block) {
+            (Block::Options, Block::World) => {
+                let message = format!("{word} cannot stand after WorldBegin");
+                self.r.error_help("E0101", message, span, "move it above WorldBegin");
+            }
+            // Said when it is known whether there is a WorldBegin at all.
+            (Block::World, Block::Options) => self.before_world.get_or_insert((span, word, 0)).2 += 1,
+            (Block::Options, Block::Options) | (Block::World, Block::World) => {}
         }
-        let (message, help) = match block {
-            Block::Options => (format!("{word} cannot stand after WorldBegin"), "move it above WorldBegin"),
-            Block::World => (format!("{word} cannot stand before WorldBegin"), "write WorldBegin above it"),
-        };
-        self.r.error_help("E0101", message, span, help);
-        Ok(())
+    }
+
+    fn world_begins(&mut self, span: Span) {
+        if self.block == Block::World {
+            let second = Diagnostic::error("E0113", "a second WorldBegin", span).help("leave it out");
+            self.r.push(second.also(self.world_begin, "the world began here"));
+        } else if let Some((place, word, count)) = self.before_world {
+            let more = if count > 1 { format!(", nor can {} more below it", count - 1) } else { String::new() };
+            let early = Diagnostic::error("E0101", format!("{word} cannot stand before WorldBegin{more}"), place);
+            self.r.push(early.help("move WorldBegin above it").also(span, "the world begins here"));
+        }
+        self.world_begin = span;
+        self.block = Block::World;
+        self.state.transforms = [Transform::IDENTITY; 2];
+        self.state.active = [true; 2];
+        self.coordinate_systems.insert("world".into(), self.state.transforms);
     }
 
     /// `Word "name" parameters`: the name, and the parameters with their subject.
     fn named(&mut self, span: Span, what: &str, attributes: &Attributes) -> Parsing<(Spanned<String>, Params)> {
         let name = self.string(&format!("the type of {what} in quotes"))?;
         let subject = format!("{what} \"{}\"", name.value);
-        let own = self.parameters()?;
-        let params = Params::new(own, attributes.clone(), self.state.color_space, subject, span.to(name.span));
+        let own = self.parameters().inspect_err(|_| self.r.defined_wrongly(&name))?;
+        let mut params = Params::new(own, attributes.clone(), self.state.color_space, subject, span.to(name.span));
+        params.incomplete = self.refused_parameter;
         Ok((name, params))
     }
 
     fn directive(&mut self, token: Token) -> Parsing<()> {
-        let span = self.span(token);
         if token.kind != Kind::Word {
             return self.expected("E0006", token, "a directive");
         }
         let word = self.lexer().bytes(token).to_vec();
+        self.statement(&word, token)
+    }
+
+    /// Reads what belongs to a directive, and does what it says.
+    fn statement(&mut self, word: &[u8], token: Token) -> Parsing<()> {
+        let span = self.span(token);
         let r = self.r;
         let none = Attributes::default();
-        match &word[..] {
+        match word {
             b"Shape" => {
-                self.only_in(Block::World, span, "Shape")?;
+                self.only_in(Block::World, span, "Shape");
                 let (name, params) = self.named(span, "shape", &self.state.shape_attributes.clone())?;
                 self.shape(&name, &params);
             }
             b"AttributeBegin" => {
-                self.only_in(Block::World, span, "AttributeBegin")?;
+                self.only_in(Block::World, span, "AttributeBegin");
                 self.push(Opened::Attribute, span)?;
             }
             b"AttributeEnd" => {
-                self.only_in(Block::World, span, "AttributeEnd")?;
+                self.only_in(Block::World, span, "AttributeEnd");
                 self.pop(Opened::Attribute, span);
             }
             b"TransformBegin" | b"TransformEnd" => {
@@ -332,7 +374,7 @@ impl<'r, 'a> Parser<'r, 'a> {
                 };
             }
             b"TransformTimes" => {
-                self.only_in(Block::Options, span, "TransformTimes")?;
+                self.only_in(Block::Options, span, "TransformTimes");
                 let times: [f64; 2] = self.numbers()?;
                 if times[1] < times[0] {
                     r.error("E0309", "the end time is before the start time", span);
@@ -341,7 +383,7 @@ impl<'r, 'a> Parser<'r, 'a> {
                 }
             }
             b"ReverseOrientation" => {
-                self.only_in(Block::World, span, "ReverseOrientation")?;
+                self.only_in(Block::World, span, "ReverseOrientation");
                 self.state.reverse_orientation ^= true;
             }
             b"ColorSpace" => {
@@ -352,31 +394,31 @@ impl<'r, 'a> Parser<'r, 'a> {
                 }
             }
             b"Material" => {
-                self.only_in(Block::World, span, "Material")?;
+                self.only_in(Block::World, span, "Material");
                 let (kind, params) = self.named(span, "material", &self.state.material_attributes.clone())?;
                 self.state.material = MaterialUse::Index(self.materials.len() as u32);
                 self.materials.push(PendingMaterial { name: None, kind, params });
             }
             b"MakeNamedMaterial" => {
-                self.only_in(Block::World, span, "MakeNamedMaterial")?;
+                self.only_in(Block::World, span, "MakeNamedMaterial");
                 self.make_named_material(span)?;
             }
             b"NamedMaterial" => {
-                self.only_in(Block::World, span, "NamedMaterial")?;
+                self.only_in(Block::World, span, "NamedMaterial");
                 let name = self.string("the name of a material in quotes")?;
                 self.state.material = MaterialUse::Named(Rc::new(name));
             }
             b"Texture" => {
-                self.only_in(Block::World, span, "Texture")?;
+                self.only_in(Block::World, span, "Texture");
                 self.texture(span)?;
             }
             b"LightSource" => {
-                self.only_in(Block::World, span, "LightSource")?;
+                self.only_in(Block::World, span, "LightSource");
                 let (name, params) = self.named(span, "light", &self.state.light_attributes.clone())?;
                 self.light(&name, &params);
             }
             b"AreaLightSource" => {
-                self.only_in(Block::World, span, "AreaLightSource")?;
+                self.only_in(Block::World, span, "AreaLightSource");
                 let (name, params) = self.named(span, "area light", &self.state.light_attributes.clone())?;
                 self.state.area_light = lights::area_light(r, &name, &params);
             }
@@ -390,7 +432,7 @@ impl<'r, 'a> Parser<'r, 'a> {
             }
             b"MediumInterface" => self.medium_interface()?,
             b"Camera" => {
-                self.only_in(Block::Options, span, "Camera")?;
+                self.only_in(Block::Options, span, "Camera");
                 let (name, params) = self.named(span, "camera", &none)?;
                 let motion = self.state.motion();
                 let inverse = self.state.transforms.map(|t| t.inverse());
@@ -399,55 +441,42 @@ impl<'r, 'a> Parser<'r, 'a> {
                 self.desc.camera = camera::camera(r, &name, &params, motion);
             }
             b"Film" => {
-                self.only_in(Block::Options, span, "Film")?;
+                self.only_in(Block::Options, span, "Film");
                 let (name, params) = self.named(span, "film", &none)?;
                 self.desc.film = film::film(r, &name, &params);
             }
             b"PixelFilter" => {
-                self.only_in(Block::Options, span, "PixelFilter")?;
+                self.only_in(Block::Options, span, "PixelFilter");
                 let (name, params) = self.named(span, "filter", &none)?;
                 self.desc.filter = film::filter(r, &name, &params);
             }
             b"Sampler" => {
-                self.only_in(Block::Options, span, "Sampler")?;
+                self.only_in(Block::Options, span, "Sampler");
                 let (name, params) = self.named(span, "sampler", &none)?;
                 self.desc.sampler = settings::sampler(r, &name, &params);
             }
             b"Integrator" => {
-                self.only_in(Block::Options, span, "Integrator")?;
+                self.only_in(Block::Options, span, "Integrator");
                 let (name, params) = self.named(span, "integrator", &none)?;
                 (self.desc.integrator, self.integrator) = settings::integrator(r, &name, &params);
             }
             b"Accelerator" => {
-                self.only_in(Block::Options, span, "Accelerator")?;
+                self.only_in(Block::Options, span, "Accelerator");
                 let (name, params) = self.named(span, "accelerator", &none)?;
                 settings::accelerator(r, &name, &params);
             }
             b"Option" => self.option()?,
-            b"WorldBegin" => {
-                if self.block == Block::World {
-                    r.push(
-                        Diagnostic::error("E0113", "a second WorldBegin", span)
-                            .also(self.world_begin, "the world began here")
-                            .help("leave it out"),
-                    );
-                }
-                self.world_begin = span;
-                self.block = Block::World;
-                self.state.transforms = [Transform::IDENTITY; 2];
-                self.state.active = [true; 2];
-                self.coordinate_systems.insert("world".into(), self.state.transforms);
-            }
+            b"WorldBegin" => self.world_begins(span),
             b"Include" => {
                 let name = self.string("a file name in quotes")?;
                 self.include(&name, false);
             }
             b"Import" => {
-                self.only_in(Block::World, span, "Import")?;
+                self.only_in(Block::World, span, "Import");
                 let name = self.string("a file name in quotes")?;
                 self.include(&name, true);
             }
-            _ => return self.unknown_directive(&word, token),
+            _ => return self.unknown_directive(word, token),
         }
         Ok(())
     }
@@ -462,12 +491,15 @@ impl<'r, 'a> Parser<'r, 'a> {
             return self.expected("E0006", token, "a directive");
         }
         let text: String = String::from_utf8_lossy(word).chars().take(40).collect();
-        let help = match did_you_mean(&text, DIRECTIVES.iter().copied()) {
-            Some(near) => format!("did you mean {near}?"),
-            None => "directives begin with a capital letter, like Shape or Material".into(),
+        let message = format!("unknown directive {text}");
+        let Some(near) = meant_directive(&text) else {
+            let help = "directives begin with a capital letter, like Shape or Material";
+            self.r.error_help("E0006", message, span, help);
+            return Err(Abandoned);
         };
-        self.r.error_help("E0006", format!("unknown directive {text}"), span, help);
-        Err(Abandoned)
+        // Read on as if it said so: what it opens will be closed, what it names will be used, and it may hold other mistakes.
+        self.r.error_help("E0006", message, span, format!("did you mean {near}?"));
+        self.statement(near.as_bytes(), token)
     }
 
     // Transforms.
@@ -495,6 +527,14 @@ impl<'r, 'a> Parser<'r, 'a> {
     fn singular(&self, span: Span, why: &str) {
         self.r.error_help("E0107", "this transform cannot be undone", span, why);
     }
+}
+
+/// The directive that a word stands for: the nearest, or the only one that begins so.
+fn meant_directive(word: &str) -> Option<&'static str> {
+    did_you_mean(word, DIRECTIVES.iter().copied()).or_else(|| {
+        let mut longer = DIRECTIVES.iter().filter(|d| word.len() >= 4 && d.starts_with(word));
+        longer.next().filter(|_| longer.next().is_none()).copied()
+    })
 }
 
 /// pbrt writes the columns one after another.

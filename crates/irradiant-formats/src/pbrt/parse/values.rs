@@ -20,23 +20,55 @@ impl Parser<'_, '_> {
         self.lexer().span(token)
     }
 
-    pub(super) fn skip_to_directive(&mut self) {
-        loop {
-            let lexer = self.lexer();
-            let token = lexer.peek();
-            let at_directive = token.kind == Kind::Word && {
-                let word = lexer.bytes(token);
-                DIRECTIVES.iter().any(|d| d.as_bytes() == word) || legacy::directive(word).is_some()
-            };
-            if token.kind == Kind::End || at_directive {
-                return;
-            }
-            lexer.next();
+    /// True for a word with which a statement begins: whatever was expected here is missing.
+    pub(super) fn begins_statement(&mut self, token: Token) -> bool {
+        token.kind == Kind::Word && {
+            let word = self.lexer().bytes(token);
+            DIRECTIVES.iter().any(|d| d.as_bytes() == word) || legacy::directive(word).is_some()
         }
     }
 
-    /// Complains about a token that is not what had to come.
+    /// True for a string like `"float radius"`.
+    fn declares_parameter(&mut self, token: Token) -> bool {
+        if token.kind != Kind::Text {
+            return false;
+        }
+        let text = String::from_utf8_lossy(self.lexer().bytes(token)).into_owned();
+        let mut words = text.trim_matches('"').split_ascii_whitespace();
+        let kind = words.next().is_some_and(|w| Type::NAMES.iter().any(|(n, _)| *n == w));
+        kind && words.next().is_some() && words.next().is_none()
+    }
+
+    /// True for a declaration that its value follows: a string where a name or a value is expected is not that string then.
+    fn is_parameter(&mut self, token: Token) -> bool {
+        self.declares_parameter(token) && {
+            let mut ahead = self.lexer().clone();
+            ahead.back_to(token);
+            ahead.next();
+            let value = ahead.next();
+            match value.kind {
+                Kind::Open => true,
+                Kind::Word => !self.begins_statement(value),
+                Kind::Text | Kind::Unterminated | Kind::Close | Kind::End => false,
+            }
+        }
+    }
+
+    pub(super) fn skip_to_directive(&mut self) {
+        loop {
+            let token = self.lexer().peek();
+            if token.kind == Kind::End || self.begins_statement(token) {
+                return;
+            }
+            self.lexer().next();
+        }
+    }
+
+    /// Complains about a token that is not what had to come. A directive is not consumed: it stands where it should.
     pub(super) fn expected<T>(&mut self, code: &'static str, token: Token, what: &str) -> Parsing<T> {
+        if self.begins_statement(token) {
+            self.lexer().back_to(token);
+        }
         let span = self.span(token);
         let shown = String::from_utf8_lossy(self.lexer().bytes(token)).chars().take(40).collect::<String>();
         match token.kind {
@@ -53,7 +85,7 @@ impl Parser<'_, '_> {
 
     pub(super) fn string(&mut self, what: &str) -> Parsing<Spanned<String>> {
         let token = self.lexer().next();
-        if token.kind != Kind::Text {
+        if token.kind != Kind::Text || self.is_parameter(token) {
             return self.expected("E0003", token, what);
         }
         self.dequote(token)
@@ -109,13 +141,15 @@ impl Parser<'_, '_> {
 
     pub(super) fn parameters(&mut self) -> Parsing<Vec<Param>> {
         let mut list = vec![];
+        self.refused_parameter = false;
         loop {
             let token = self.lexer().peek();
             match token.kind {
                 Kind::Text => {
                     self.lexer().next();
-                    if let Some(p) = self.parameter(token)? {
-                        list.push(p);
+                    match self.parameter(token)? {
+                        Some(p) => list.push(p),
+                        None => self.refused_parameter = true,
                     }
                 }
                 Kind::Unterminated => {
@@ -179,19 +213,27 @@ impl Parser<'_, '_> {
     /// The values after a declaration, and where they end; `None` when they are of the wrong kind (reported, skipped).
     pub(super) fn values(&mut self, kind: Type, known: bool, declaration: &str) -> Parsing<Option<(Values, usize)>> {
         let first = self.lexer().next();
+        let value = || format!("a value for \"{declaration}\"");
         match first.kind {
             Kind::Open if !known => {
-                self.skip_list()?;
+                self.skip_list();
                 Ok(None)
             }
             Kind::Open => self.bracketed(kind, first),
+            Kind::Word if self.begins_statement(first) => self.expected("E0007", first, &value()),
+            Kind::Text if self.is_parameter(first) => {
+                // Reported; the next parameter can be read all the same.
+                let _ = self.expected::<()>("E0007", first, &value());
+                self.lexer().back_to(first);
+                Ok(None)
+            }
             Kind::Word | Kind::Text if !known => Ok(None),
             Kind::Word | Kind::Text => {
                 let mut values = Self::empty(kind, first, self.lexer());
                 let good = self.value(kind, first, &mut values)?;
                 Ok(good.then_some((values, first.end)))
             }
-            _ => self.expected("E0007", first, &format!("a value for \"{declaration}\"")),
+            _ => self.expected("E0007", first, &value()),
         }
     }
 
@@ -227,36 +269,47 @@ impl Parser<'_, '_> {
                     let place = self.lexer().here();
                     return Ok(good.then_some((values, place)));
                 }
-                ListEnd::End => {
-                    let span = self.span(open);
-                    self.r.error_help("E0007", "this list has no end", span, "close it with ]");
-                    return Err(Abandoned);
-                }
                 ListEnd::Bad(token) if token.kind == Kind::Open => {
                     return self.expected("E0007", token, "a value or ]");
+                }
+                // What cannot be a value shows that the list should have ended before: it is read as what it is.
+                ListEnd::Bad(token) if self.begins_statement(token) || self.is_parameter(token) => {
+                    self.lexer().back_to(token);
+                    self.endless_list(open);
+                    return Ok(None);
+                }
+                ListEnd::End => {
+                    self.endless_list(open);
+                    return Err(Abandoned);
                 }
                 ListEnd::Bad(token) => good &= self.value(kind, token, &mut values)?,
             }
             if !good {
-                self.skip_list()?;
+                self.skip_list();
                 return Ok(None);
             }
         }
     }
 
-    /// Skips to the end of a list.
-    pub(super) fn skip_list(&mut self) -> Parsing<()> {
+    fn endless_list(&mut self, open: Token) {
+        let span = self.span(open);
+        self.r.error_help("E0007", "this list has no end", span, "close it with ]");
+    }
+
+    /// Skips to the end of a list of which something has been said already; what cannot be in a list ends it too.
+    pub(super) fn skip_list(&mut self) {
         loop {
             let token = self.lexer().peek();
             match token.kind {
                 Kind::Close => {
                     self.lexer().next();
-                    return Ok(());
+                    return;
                 }
-                Kind::End | Kind::Open | Kind::Unterminated => {
-                    return self.expected("E0007", token, "]");
+                Kind::End | Kind::Open | Kind::Unterminated => return,
+                Kind::Word | Kind::Text if self.begins_statement(token) || self.is_parameter(token) => return,
+                Kind::Word | Kind::Text => {
+                    self.lexer().next();
                 }
-                _ => drop(self.lexer().next()),
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Nesting, objects, attributes, includes, and the things in the world that directives make.
 
 use super::super::lex::{Kind, Lexer};
+use super::super::other_files::not_a_scene;
 use super::super::params::{Param, Params};
 use super::super::state::*;
 use super::super::{legacy, lights, settings, shapes};
@@ -48,9 +49,11 @@ impl Parser<'_, '_> {
     }
 
     pub(super) fn object_begin(&mut self, span: Span) -> Parsing<()> {
-        self.only_in(Block::World, span, "ObjectBegin")?;
-        let name = self.string("the name of an object in quotes")?;
+        self.only_in(Block::World, span, "ObjectBegin");
+        // The end will come, whether there is a name or not.
+        let name = self.string("the name of an object in quotes");
         self.push(Opened::Object, span)?;
+        let name = name?;
         if self.active_object.is_some() {
             self.r.error("E0105", "ObjectBegin inside of an object", span);
             return Ok(());
@@ -69,7 +72,7 @@ impl Parser<'_, '_> {
     }
 
     pub(super) fn object_instance(&mut self, span: Span) -> Parsing<()> {
-        self.only_in(Block::World, span, "ObjectInstance")?;
+        self.only_in(Block::World, span, "ObjectInstance");
         let name = self.string("the name of an object in quotes")?;
         if self.active_object.is_some() {
             self.r.error("E0105", "ObjectInstance inside of an object", span);
@@ -130,12 +133,14 @@ impl Parser<'_, '_> {
     pub(super) fn texture(&mut self, span: Span) -> Parsing<()> {
         let name = self.string("the name of a texture in quotes")?;
         let class = self.string("\"float\" or \"spectrum\"")?;
-        let (kind, params) = self.named(span, "texture", &self.state.texture_attributes.clone())?;
+        let read = self.named(span, "texture", &self.state.texture_attributes.clone());
+        let (kind, params) = read.inspect_err(|_| self.r.defined_wrongly(&name))?;
         let is_float = match class.value.as_str() {
             "float" => true,
             "spectrum" => false,
             _ => {
                 legacy::texture_class(self.r, &class);
+                self.r.defined_wrongly(&name);
                 return Ok(());
             }
         };
@@ -212,13 +217,18 @@ impl Parser<'_, '_> {
     }
 
     pub(super) fn option(&mut self) -> Parsing<()> {
-        let name = self.string("the name of an option in quotes")?;
+        // A type may stand before the name, as in a parameter.
+        let token = self.lexer().next();
+        if token.kind != Kind::Text {
+            return self.expected("E0003", token, "the name of an option in quotes");
+        }
+        let name = self.dequote(token)?;
         let mut token = self.lexer().next();
         let bracket = token.kind == Kind::Open;
         if bracket {
             token = self.lexer().next();
         }
-        if !matches!(token.kind, Kind::Word | Kind::Text) {
+        if !matches!(token.kind, Kind::Word | Kind::Text) || self.begins_statement(token) {
             return self.expected("E0007", token, "the value of the option");
         }
         let value = match token.kind {
@@ -229,7 +239,10 @@ impl Parser<'_, '_> {
             }
         };
         if bracket {
-            self.skip_list()?;
+            let close = self.lexer().next();
+            if close.kind != Kind::Close {
+                return self.expected("E0007", close, "] after the value of the option");
+            }
         }
         settings::option(self.r, &mut self.desc.options, &name, &value);
         Ok(())
@@ -249,6 +262,10 @@ impl Parser<'_, '_> {
                 let fits = t.len() <= u32::MAX as usize;
                 if !fits {
                     self.r.error("E1002", "scene texts are limited to 4 GiB", name.span);
+                } else if let Some(looks_like) = not_a_scene(t) {
+                    let message = format!("\"{}\" is no pbrt scene but {looks_like}", name.value);
+                    self.r.error_help("E1010", message, name.span, "only pbrt text can be included, gzipped or not");
+                    return false;
                 }
                 fits
             });
