@@ -77,7 +77,11 @@ pub fn open(path: &Path) -> Result<Image, Exit> {
     match read_file(path, &ReadOptions::default()) {
         Ok(image) => Ok(image),
         Err(why) => {
-            say!("{}: {why}", path.display());
+            match &why {
+                // It names the file itself.
+                ImageError::Io { .. } => say!("{why}"),
+                _ => say!("{}: {why}", path.display()),
+            }
             let missing = matches!(&why, ImageError::Io { error, .. } if error.kind() == std::io::ErrorKind::NotFound);
             Err(if missing { Exit::Missing } else { Exit::BadInput })
         }

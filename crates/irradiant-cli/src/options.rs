@@ -31,6 +31,9 @@ pub struct PictureOptions {
     /// Basis of colour
     #[arg(long, value_name = "BASIS", value_enum, default_value = "spectral")]
     pub color: Color,
+    /// Memory that the picture's sums may take, e.g. 16G; larger films are refused before anything is reserved
+    #[arg(long, value_name = "SIZE", default_value = "4G", value_parser = parse_size)]
+    pub max_film_memory: u64,
     /// Scene content that is not honoured is an error
     #[arg(long)]
     pub strict: bool,
@@ -72,6 +75,7 @@ impl PictureOptions {
                 Color::Spectral => ColorMode::Spectral,
                 Color::Rgb => ColorMode::Rgb,
             },
+            max_film_bytes: Some(self.max_film_memory),
             strict: self.strict,
             ..RenderSettings::default()
         }
@@ -135,6 +139,22 @@ pub fn parse_exposure(text: &str) -> Result<f32, String> {
     }
 }
 
+/// `500M`, `16G`, `16GiB`: powers of 1024.
+fn parse_size(text: &str) -> Result<u64, String> {
+    let split = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let shift = match unit.trim().trim_end_matches("iB").trim_end_matches('B') {
+        "" => 0,
+        "k" | "K" => 10,
+        "M" => 20,
+        "G" => 30,
+        "T" => 40,
+        _ => return Err(format!("\"{unit}\" is not a unit of memory; use K, M, G or T")),
+    };
+    let number: u64 = number.parse().map_err(|_| "write it as 500M or 16G".to_string())?;
+    number.checked_mul(1 << shift).ok_or_else(|| "more than any machine has".into())
+}
+
 /// `90`, `90s`, `1.5m`, `2h`, `500ms`.
 pub fn parse_duration(text: &str) -> Result<Duration, String> {
     let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
@@ -164,6 +184,17 @@ mod tests {
         assert_eq!(parse_duration("250ms").unwrap(), Duration::from_millis(250));
         for bad in ["", "x", "5 parsecs", "0s", "-3s"] {
             assert!(parse_duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn memory_is_counted_in_powers_of_two() {
+        assert_eq!(parse_size("4G").unwrap(), 4 << 30);
+        assert_eq!(parse_size("16GiB").unwrap(), 16 << 30);
+        assert_eq!(parse_size("500MB").unwrap(), 500 << 20);
+        assert_eq!(parse_size("7").unwrap(), 7);
+        for bad in ["", "G", "4X", "-1G", "1.5G", "99999999T"] {
+            assert!(parse_size(bad).is_err(), "{bad}");
         }
     }
 

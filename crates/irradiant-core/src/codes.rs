@@ -65,7 +65,7 @@ pub const CODES: &[(&str, &str)] = &[
     (
         "E0907",
         "The film would take more memory than is allowed: sums and counts of a pixel take 112 bytes, each further channel 16. \
-         Render the picture in parts with a crop window, or make it smaller.",
+         Render the picture in parts with a crop window, make it smaller, or allow more (--max-film-memory).",
     ),
     (
         "E0908",

@@ -27,15 +27,23 @@ pub struct ToneOptions {
     pub dither: bool,
 }
 
-/// The picture (R, G, B, or grey as such) after exposure and curve, still linear, in floats.
+/// The picture (R, G, B, or grey as such) after exposure and curve, still linear, in floats, with sRGB's primaries: colours
+/// of a picture that states others are converted first, white to white.
 ///
 /// An error if it has neither R, G, B nor a lone channel.
 pub fn tone_map(image: &Image, options: &ToneOptions) -> Result<Image, ImageError> {
     let mut picture = crate::format::displayable(image, 3)?.convert(PixelFormat::F32, Encoding::Linear);
     let count = picture.channel_count();
     let factor = libm::exp2f(options.exposure);
+    let stated = image.metadata.chromaticities.filter(|c| !c.is_srgb());
+    let to_srgb = stated.and_then(|c| c.to_srgb()).map(|m| m.map(|row| row.map(|v| v as f32)));
+    picture.metadata.chromaticities = None;
     if let Some(samples) = picture.as_f32_mut() {
         for pixel in samples.chunks_exact_mut(count) {
+            if let (Some(m), [r, g, b]) = (&to_srgb, &mut *pixel) {
+                let given = [*r, *g, *b];
+                [*r, *g, *b] = m.map(|row| row[0] * given[0] + row[1] * given[1] + row[2] * given[2]);
+            }
             for value in pixel.iter_mut() {
                 *value *= factor;
             }
@@ -140,6 +148,25 @@ mod tests {
         assert_eq!(codes(&plain), [137, 99, 0]);
         let brighter = to_srgb8(&image, &ToneOptions { exposure: 2.0, ..ToneOptions::default() }).unwrap();
         assert_eq!(codes(&brighter), [255, 188, 0]);
+    }
+
+    #[test]
+    fn a_display_shows_srgb_whatever_primaries_a_picture_has() {
+        let mut image = Image::from_fn(2, 1, ["R", "G", "B"], |x, _| [[0.5, 0.5, 0.5], [0.3, 0.2, 0.1]][x]);
+        let plain = to_srgb8(&image, &ToneOptions::default()).unwrap();
+        // Stating sRGB's changes nothing, to the bit, and a wide red is redder than sRGB's.
+        image.metadata.chromaticities = Some(crate::metadata::Chromaticities::SRGB);
+        assert_eq!(codes(&to_srgb8(&image, &ToneOptions::default()).unwrap()), codes(&plain));
+        image.metadata.chromaticities = Some(crate::metadata::Chromaticities {
+            red: [0.708, 0.292],
+            green: [0.170, 0.797],
+            blue: [0.131, 0.046],
+            white: [0.3127, 0.3290],
+        });
+        let wide = to_srgb8(&image, &ToneOptions::default()).unwrap();
+        assert_eq!(codes(&wide)[..3], codes(&plain)[..3]);
+        // 1.6605 x 0.3 - 0.5876 x 0.2 - 0.0728 x 0.1 = 0.3734 and so on, encoded.
+        assert_eq!(codes(&wide)[3..], [165, 121, 83]);
     }
 
     #[test]

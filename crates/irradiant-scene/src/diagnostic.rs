@@ -98,9 +98,9 @@ impl Diagnostic {
         };
         let mut out = format!("{word}[{}]: {}\n", self.code, printable(&self.message));
         for (span, text) in &self.labels {
-            let Some((line, column, source)) = sources.locate(*span) else { continue };
+            let Some((line, column)) = sources.locate(*span) else { continue };
             let name = printable(sources.get(span.file).map_or("", |s| &s.name));
-            let (shown, caret_at) = excerpt(&source, column);
+            let (shown, caret_at) = excerpt(sources, *span);
             let width = (span.end.saturating_sub(span.start) as usize)
                 .min(shown.chars().count().saturating_sub(caret_at))
                 .max(1);
@@ -140,10 +140,11 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// A window of at most 100 characters of a (possibly huge) line around a column, and the caret's place in it.
-fn excerpt(line: &str, column: usize) -> (String, usize) {
+/// A window of at most 100 characters of a (possibly huge) line around a span, and the caret's place in it.
+fn excerpt(sources: &Sources, span: Span) -> (String, usize) {
+    // A character takes four bytes at most.
+    let (line, at) = sources.around(span, 400).unwrap_or_default();
     let chars: Vec<char> = line.chars().map(|c| if is_command(c) { ' ' } else { c }).collect();
-    let at = column - 1;
     let start = if chars.len() <= 100 { 0 } else { at.saturating_sub(40) };
     let end = chars.len().min(start + 100);
     (chars[start..end].iter().collect(), at - start)

@@ -52,6 +52,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, Error> {
     let text = assets.read(path).map_err(|why| {
         unreadable(match why {
             AssetError::NotFound => std::io::Error::from(std::io::ErrorKind::NotFound),
+            AssetError::Unreadable(why) => std::io::Error::other(why),
             other => std::io::Error::other(other.to_string()),
         })
     })?;

@@ -7,6 +7,7 @@ use crate::load::SceneFile;
 use crate::settings::{ColorMode, MaxDepth, RenderSettings};
 use irradiant_core::film::{DevelopOptions, Film};
 use irradiant_core::scene::{CompileOptions, Scene};
+use irradiant_image::metadata::Chromaticities;
 use irradiant_image::{FileFormat, Image, ToneOptions, atomic_write};
 use irradiant_render::layered_path::{LayeredPath, PathLayer, PathLayers};
 use irradiant_render::path::PathIntegrator;
@@ -54,7 +55,7 @@ impl Job {
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
             light_sampler: integrator.light_sampler(),
-            ..CompileOptions::default()
+            max_film_bytes: settings.max_film_bytes.unwrap_or(CompileOptions::MAX_FILM_BYTES),
         };
         if settings.samples_per_pixel == Some(0) {
             return Err(Error::Settings("0 samples per pixel make no picture".into()));
@@ -194,6 +195,10 @@ impl Rendering {
         let [width, height] = self.film.full_resolution();
         image.metadata.origin = [bounds.x0, bounds.y0];
         image.metadata.display_window = Some([0, 0, width as i32, height as i32]);
+        let pair = |[x, y]: [f64; 2]| [x as f32, y as f32];
+        let [red, green, blue] = self.color_space.primaries.map(pair);
+        let white = pair(self.color_space.white);
+        image.metadata.chromaticities = Some(Chromaticities { red, green, blue, white });
         self.header.write_to(&mut image.metadata);
         image
     }

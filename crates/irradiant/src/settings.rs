@@ -50,6 +50,8 @@ pub struct RenderSettings {
     pub max_depth: Option<MaxDepth>,
     /// Basis of colour.
     pub color: ColorMode,
+    /// Films that would take more memory than this, bytes, are refused before anything is reserved; 4 GiB by default.
+    pub max_film_bytes: Option<u64>,
     /// Scene content that is not honoured is an error.
     pub strict: bool,
 }

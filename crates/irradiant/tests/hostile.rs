@@ -199,6 +199,10 @@ fn a_film_beyond_memory_is_refused_before_it_is_made() {
     // A part of it is fine.
     let part = RenderSettings { crop: Some([0.0, 0.01, 0.0, 0.01]), ..RenderSettings::default() };
     assert!(Job::new(&file, &part).is_ok());
+    // And so is all of it for whoever has the memory; nothing is reserved before the start.
+    let allowed = |bytes| RenderSettings { max_film_bytes: Some(bytes), ..RenderSettings::default() };
+    assert!(Job::new(&file, &allowed(448 << 30)).is_ok());
+    assert!(Job::new(&file, &allowed((448 << 30) - 1)).is_err());
 }
 
 #[test]

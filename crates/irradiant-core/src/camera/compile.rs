@@ -301,7 +301,7 @@ fn elements(
             let wanted = aperture_diameter.value as f64;
             if wanted > diameter {
                 let message = format!(
-                    "the aperture of {wanted} mm is wider than the lens's widest, {diameter} mm, which is taken"
+                    "the aperture of {wanted} mm is wider than the lens's widest, {diameter:.3} mm, which is taken"
                 );
                 diagnostics.push(Diagnostic::warning("W0913", message, aperture_diameter.span));
             } else {

@@ -251,10 +251,10 @@ fn fits(bounds: &PixelBounds, film: &FilmDesc, limit: u64, diagnostics: &mut Dia
             gib(bytes),
             gib(limit)
         );
-        diagnostics.push(
-            Diagnostic::error("E0907", message, film.resolution.span)
-                .help("render it in parts with \"cropwindow\" (or --crop), or make it smaller (--resolution)"),
-        );
+        diagnostics.push(Diagnostic::error("E0907", message, film.resolution.span).help(
+            "render it in parts with \"cropwindow\" (or --crop), make it smaller (--resolution), or allow more \
+                     (--max-film-memory)",
+        ));
     }
     bytes <= limit
 }
@@ -264,7 +264,8 @@ fn check_filter(desc: &SceneDesc, diagnostics: &mut Diagnostics) {
         if !(radius.value > 0.0 && radius.value <= 1e4) {
             let message = format!("a pixel filter of radius {}", radius.value);
             diagnostics.push(
-                Diagnostic::error("E0903", message, radius.span).help("radii are half-widths in pixels, more than 0"),
+                Diagnostic::error("E0903", message, radius.span)
+                    .help("radii are half-widths in pixels, more than 0, at most 10000"),
             );
         }
     }

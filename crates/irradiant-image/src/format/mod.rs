@@ -155,7 +155,9 @@ pub fn read(bytes: &[u8], name_hint: &str, options: &ReadOptions) -> Result<Imag
         Some(FileFormat::Tga) => tga::read_tga(bytes, options),
         Some(FileFormat::Qoi) => qoi::read_qoi(bytes, options),
         Some(FileFormat::Bmp) => bmp::read_bmp(bytes, options),
-        None => Err(ImageError::unsupported(format!("{name_hint:?} is of no format known here"))),
+        None => Err(ImageError::unsupported(format!(
+            "{name_hint:?} is of no format known here; known are EXR, PNG, PFM, HDR, JPEG, TGA, QOI and BMP"
+        ))),
     }
 }
 
