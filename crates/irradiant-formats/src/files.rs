@@ -75,6 +75,7 @@ pub(crate) fn gunzip(bytes: Arc<[u8]>, limit: u64) -> Result<Arc<[u8]>, AssetErr
     if !bytes.starts_with(&[0x1f, 0x8b, 8]) {
         return Ok(bytes);
     }
+    let limit = most_decompressed(bytes.len() as u64, limit);
     let mut out = Vec::new();
     flate2::read::MultiGzDecoder::new(&bytes[..])
         .take(limit + 1)
@@ -84,6 +85,12 @@ pub(crate) fn gunzip(bytes: Arc<[u8]>, limit: u64) -> Result<Arc<[u8]>, AssetErr
         return Err(AssetError::TooLarge { bytes: out.len() as u64, limit });
     }
     Ok(out.into())
+}
+
+/// What a gzip file may decompress to: deflate makes a thousand bytes of one at most, scenes and meshes rarely twenty, so
+/// beyond 256 MiB more than 64 is taken for a bomb.
+fn most_decompressed(compressed: u64, limit: u64) -> u64 {
+    limit.min(compressed.saturating_mul(64).max(256 << 20))
 }
 
 #[cfg(test)]
@@ -102,6 +109,14 @@ mod tests {
         assert!(matches!(gunzip(cut, 1 << 20), Err(AssetError::Unreadable(_))));
         let plain: Arc<[u8]> = Arc::from(&b"WorldBegin"[..]);
         assert_eq!(gunzip(plain.clone(), 1 << 20).unwrap(), plain);
+    }
+
+    #[test]
+    fn a_small_file_cannot_fill_the_memory() {
+        assert_eq!(most_decompressed(10_000_000, 16 << 30), 640_000_000);
+        assert_eq!(most_decompressed(1000, 16 << 30), 256 << 20);
+        assert_eq!(most_decompressed(1 << 30, 16 << 30), 16 << 30);
+        assert_eq!(most_decompressed(u64::MAX, 5), 5);
     }
 
     #[test]

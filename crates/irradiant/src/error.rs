@@ -34,8 +34,11 @@ impl std::fmt::Display for Report {
         match (count(Severity::Error), count(Severity::Warning)) {
             (0, 0) => Ok(()),
             (0, w) => write!(f, "{}", plural(w, "warning")),
-            (e, 0) => write!(f, "{}", plural(e, "error")),
-            (e, w) => write!(f, "{}, {}", plural(e, "error"), plural(w, "warning")),
+            (e, w) => {
+                let more = if e >= Diagnostics::MAX_ERRORS { " (what comes after them was not looked at)" } else { "" };
+                let warnings = if w > 0 { format!(", {}", plural(w, "warning")) } else { String::new() };
+                write!(f, "{}{more}{warnings}", plural(e, "error"))
+            }
         }
     }
 }

@@ -244,13 +244,15 @@ fn pixel_bounds(film: &FilmDesc, diagnostics: &mut Diagnostics) -> Option<PixelB
 fn fits(bounds: &PixelBounds, film: &FilmDesc, limit: u64, diagnostics: &mut Diagnostics) -> bool {
     let bytes = (bounds.area() as u64).saturating_mul(Film::bytes_per_pixel(LayerPlan::channels_of(film)));
     if bytes > limit {
-        let gib = |bytes: u64| bytes as f64 / (1u64 << 30) as f64;
+        // Small limits deserve small units.
+        let size = |bytes: u64| match bytes {
+            0..0x10_0000 => format!("{:.1} KiB", bytes as f64 / 1024.0),
+            0x10_0000..0x4000_0000 => format!("{:.1} MiB", bytes as f64 / 1_048_576.0),
+            _ => format!("{:.1} GiB", bytes as f64 / 1_073_741_824.0),
+        };
         let [width, height] = [bounds.width(), bounds.height()];
-        let message = format!(
-            "a film of {width} x {height} pixels takes {:.1} GiB of memory; {:.1} are allowed",
-            gib(bytes),
-            gib(limit)
-        );
+        let message =
+            format!("a film of {width} x {height} pixels takes {} of memory; {} are allowed", size(bytes), size(limit));
         diagnostics.push(Diagnostic::error("E0907", message, film.resolution.span).help(
             "render it in parts with \"cropwindow\" (or --crop), make it smaller (--resolution), or allow more \
                      (--max-film-memory)",
