@@ -91,6 +91,11 @@ pub trait Integrator: Send + Sync {
         true
     }
 
+    /// True when its samples bring light to other pixels than their own ([`FilmTile::splat`]), for which the film takes memory.
+    fn splats(&self) -> bool {
+        false
+    }
+
     /// Whether it can estimate this scene's picture; if not, why, and what to try. Asked before rendering.
     fn check(&self, _scene: &Scene) -> Result<(), String> {
         Ok(())

@@ -55,6 +55,10 @@ impl Integrator for LightTraceIntegrator {
         }
     }
 
+    fn splats(&self) -> bool {
+        true
+    }
+
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
         depth.into_iter().chain([Limit::Truncation(UNSEEN.into())]).collect()

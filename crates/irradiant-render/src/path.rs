@@ -8,6 +8,7 @@
 use crate::camera_samples::{CameraSample, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
+use crate::registry::{Options, words};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
@@ -22,12 +23,34 @@ use irradiant_math::{Point2, Ray};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
 /// What can be set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathIntegrator {
     /// Scattering events at most; `None`: no limit.
     pub max_depth: Option<u32>,
     /// Blur sharp lobes after the first non-specular bounce. Biased.
     pub regularize: bool,
+    /// When paths end by chance.
+    pub roulette: Roulette,
+}
+
+/// When paths end by chance; the expected picture is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Roulette {
+    /// When they carry little: [`survival_probability`].
+    #[default]
+    Throughput,
+    /// At each event with this chance, in (0, 1): for looking at light of many bounces, which ends early by throughput.
+    Constant(f32),
+}
+
+words! {
+    /// When a path ends by chance.
+    enum Ends {
+        /// When it carries little.
+        Throughput = "throughput",
+        /// At each event with the chance q: shows light of many bounces with less noise, the picture with more.
+        Constant = "constant",
+    }
 }
 
 impl Integrator for PathIntegrator {
@@ -85,9 +108,21 @@ pub const ENTRY: crate::registry::IntegratorEntry = {
                 default: Value::Flag(false),
                 doc: "blur sharp lobes after the first non-specular bounce; biased",
             },
+            OptionEntry {
+                name: "roulette",
+                range: OptionRange::Word(Ends::WORDS),
+                default: Ends::Throughput.value(),
+                doc: "when a path ends by chance (A46, A47)",
+            },
+            OptionEntry {
+                name: "q",
+                range: OptionRange::Number(0.01, 0.95),
+                default: Value::Number(0.1),
+                doc: "chance to end a path at each event, with roulette=constant; of finite variance only where albedo^2 < 1 - q (B25)",
+            },
             LIGHT_SAMPLER,
         ],
-        make: |options, max_depth| Box::new(PathIntegrator { max_depth, regularize: options.flag("regularize") }),
+        make: |options, max_depth| Box::new(PathIntegrator::of(options, max_depth)),
     }
 };
 
@@ -117,6 +152,15 @@ struct Previous {
 }
 
 impl PathIntegrator {
+    /// As [`ENTRY`]'s options say.
+    pub fn of(options: &Options, max_depth: Option<u32>) -> Self {
+        let roulette = match Ends::of(options.word("roulette")) {
+            Ends::Throughput => Roulette::Throughput,
+            Ends::Constant => Roulette::Constant(options.number("q")),
+        };
+        Self { max_depth, regularize: options.flag("regularize"), roulette }
+    }
+
     /// What the camera ray sees, by one random path. Fills the layers of the film at the first surface.
     pub fn radiance<R: PathRecorder>(
         &self,
@@ -228,7 +272,10 @@ impl PathIntegrator {
             }
 
             // Russian roulette: end paths that carry little.
-            let survival = survival_probability(&throughput, eta_scale, depth);
+            let survival = match self.roulette {
+                Roulette::Throughput => survival_probability(&throughput, eta_scale, depth),
+                Roulette::Constant(q) => 1.0 - q,
+            };
             recorder.scattering(&Scattering {
                 depth: depth - 1,
                 wi: sample.wi,

@@ -2,6 +2,7 @@
 
 use crate::estimate::{Estimator, Production};
 use crate::row::{Fault, Measure, Outcome, Row, Verdict};
+use crate::sheet::Sheet;
 use crate::walk::{Walk, Wrong};
 use irradiant::core::scene::Scene;
 use irradiant::renderer::Integrator;
@@ -131,6 +132,11 @@ impl Context<'_> {
         self.lesson.fault.is_some_and(|(f, _)| f.row == self.id && f.name == name)
     }
 
+    /// Whether this row suffers a fault and a measure has told so already: the rest would tell nothing more.
+    pub fn noticed(&self, sheet: &Sheet) -> bool {
+        self.lesson.fault.is_some_and(|(f, _)| f.row == self.id) && sheet.has_failed()
+    }
+
     /// What is to be wrong with the estimator of this row.
     pub fn wrong(&self) -> Wrong {
         self.lesson.fault.filter(|(f, _)| f.row == self.id).map_or(Wrong::Nothing, |(_, wrong)| wrong)
@@ -139,7 +145,7 @@ impl Context<'_> {
     /// The production estimator; under a fault the witness with something wrong.
     pub fn production(&self, max_depth: Option<u32>) -> Box<dyn Estimator> {
         match self.wrong() {
-            Wrong::Nothing => Box::new(Production { max_depth }),
+            Wrong::Nothing => Box::new(Production { max_depth, ..Production::default() }),
             wrong => Box::new(Walk { max_depth, wrong, ..Walk::WEIGHED }),
         }
     }

@@ -13,7 +13,7 @@ use irradiant::core::scene::Scene;
 use irradiant::image::Image;
 use irradiant::math::Ray;
 use irradiant::renderer::camera_samples::camera_sample;
-use irradiant::renderer::path::PathIntegrator;
+use irradiant::renderer::path::{PathIntegrator, Roulette};
 use irradiant::renderer::record::{Contribution, PathRecorder, Scattering, Technique};
 use irradiant::renderer::{Integrator, RenderStats, WorkUnit};
 use irradiant::spectrum::{SampledSpectrum, Wavelengths};
@@ -48,9 +48,19 @@ pub trait Estimator: Sync {
 }
 
 /// The production integrator.
+#[derive(Default)]
 pub struct Production {
     /// Scattering events at most.
     pub max_depth: Option<u32>,
+    /// When paths end by chance.
+    pub roulette: Roulette,
+}
+
+impl Production {
+    /// With at most so many scattering events.
+    pub fn limited(depth: u32) -> Self {
+        Self { max_depth: Some(depth), ..Self::default() }
+    }
 }
 
 struct Telling<'a> {
@@ -88,7 +98,7 @@ impl Estimator for Production {
         stats: &mut RenderStats,
         tell: &mut dyn FnMut(&Part),
     ) -> SampledSpectrum {
-        let integrator = PathIntegrator { max_depth: self.max_depth, regularize: false };
+        let integrator = PathIntegrator { max_depth: self.max_depth, roulette: self.roulette, ..Default::default() };
         let mut telling = Telling { tell, lobes: Vec::new() };
         integrator.radiance(scene, camera_ray, stream, lambda, &mut [], stats, &mut telling)
     }

@@ -15,7 +15,8 @@
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
-pub mod context;
+pub mod caustic;
+mod context;
 pub mod estimate;
 pub mod page;
 pub mod radiosity;

@@ -31,6 +31,27 @@ pub fn furnace(size: u32, rho: f64) -> String {
         )
 }
 
+/// A pixel inside a cube of walls that emit 1 and reflect `rho`, with a ball of the same; its numbers are stratified.
+pub fn furnace_room(rho: f64) -> String {
+    let mut text = smooth_film(1)
+        + "LookAt -0.5 0.3 -0.8  0.4 -0.2 0.5  0 1 0\nCamera \"perspective\" \"float fov\" 60\nWorldBegin\n"
+        + &format!("Material \"diffuse\" \"spectrum reflectance\" [ 300 {rho} 900 {rho} ]\n")
+        + "AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] \"bool twosided\" true\n";
+    (0..6).for_each(|side| text += &quad(side_of_cube(side)));
+    text + "Translate 0.3 -0.5 0.2\nShape \"sphere\" \"float radius\" 0.4\n"
+}
+
+/// Corners of a side of the cube from -1 to 1: x = -1, x = 1, y = -1, and so on.
+fn side_of_cube(i: usize) -> [[f32; 3]; 4] {
+    let (axis, side) = (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 });
+    let corner = |u: f32, v: f32| {
+        let mut p = [0.0; 3];
+        (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, u, v);
+        p
+    };
+    [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]
+}
+
 /// Things inside a closed emitter of radius 4 and albedo `rho`, seen from inside it.
 pub fn furnace_with(size: u32, rho: f64, things: &str) -> String {
     film(size)
@@ -71,16 +92,8 @@ pub fn lit_box(size: u32) -> String {
     let mut text =
         film(size) + "LookAt 0 0 -0.95  0 -0.1 0  0 1 0\nCamera \"perspective\" \"float fov\" 70\nWorldBegin\n";
     for (i, [r, g, b]) in walls.into_iter().enumerate() {
-        let (axis, side) = (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 });
-        let corner = |u: f32, v: f32| {
-            let mut p = [0.0; 3];
-            p[axis] = side;
-            p[(axis + 1) % 3] = u;
-            p[(axis + 2) % 3] = v;
-            p
-        };
         text += &format!("Material \"diffuse\" \"rgb reflectance\" [ {r} {g} {b} ]\n");
-        text += &quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
+        text += &quad(side_of_cube(i));
     }
     text + "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 3 2 4 ] \"bool twosided\" true\n"
         + &quad([[-0.6, 0.7, -0.5], [0.6, 0.7, -0.5], [0.6, 0.6, 0.6], [-0.6, 0.6, 0.6]])

@@ -208,9 +208,15 @@ impl Sheet {
         self.commands.push(text.into());
     }
 
+    /// Whether a measure is out of its bound.
+    pub fn has_failed(&self) -> bool {
+        self.measures.iter().any(|m| !m.passes)
+    }
+
     /// All measured: the row passes when each measure does. A row that measured nothing fails.
     pub fn finish(self) -> Outcome {
-        let failed: Vec<&str> = self.measures.iter().filter(|m| !m.passes).map(|m| m.what.as_str()).collect();
+        let failed = self.measures.iter().filter(|m| !m.passes);
+        let failed: Vec<String> = failed.map(|m| format!("{}: {}; bound: {}", m.what, m.value, m.bound)).collect();
         let verdict = if self.measures.is_empty() {
             Verdict::Fails("nothing was measured".into())
         } else if failed.is_empty() {

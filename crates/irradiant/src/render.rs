@@ -55,6 +55,7 @@ impl Job {
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
             light_sampler: integrator.light_sampler(),
+            splats: integrator.integrator(max_depth).splats(),
             max_film_bytes: settings.max_film_bytes.unwrap_or(CompileOptions::MAX_FILM_BYTES),
         };
         if settings.samples_per_pixel == Some(0) {
@@ -135,10 +136,7 @@ impl Job {
 
     /// The path integrator that replays samples, if this job uses it.
     pub fn path_integrator(&self) -> Option<PathIntegrator> {
-        (self.integrator.name() == "path").then(|| PathIntegrator {
-            max_depth: self.max_depth,
-            regularize: self.integrator.options().flag("regularize"),
-        })
+        (self.integrator.name() == "path").then(|| PathIntegrator::of(self.integrator.options(), self.max_depth))
     }
 
     /// What the depth limit leaves out, estimated from a few paths without limit (a sixteenth of the picture's, 16384 at most);

@@ -3,7 +3,7 @@
 //! Not a statistical test: a fixed list of mutations from a fixed seed. It shows only what it tries; a new kind of
 //! failure is to be added to `ODD`.
 
-use irradiant::{Error, Job, RenderSettings, load_text};
+use irradiant::{Error, IntegratorChoice, Job, RenderSettings, load_text};
 use std::time::{Duration, Instant};
 
 /// A mutation takes the numbers of one parameter or transform and puts odd ones in their place.
@@ -196,6 +196,21 @@ fn a_film_beyond_memory_is_refused_before_it_is_made() {
     let Err(Error::Scene(report)) = Job::new(&file, &RenderSettings::default()) else { panic!("it was made") };
     let shown = report.to_string();
     assert!(shown.contains("E0907") && shown.contains("448.0 GiB") && shown.contains("--crop"), "{shown}");
+    // What paths from lights bring has sums of its own, as large again.
+    let text = "Film \"rgb\" \"integer xresolution\" 5000 \"integer yresolution\" 5000 WorldBegin";
+    let middling = load_text("large.pbrt", text, ".").unwrap_or_else(|e| panic!("{e}"));
+    let by = |name: &str| {
+        let settings = RenderSettings {
+            integrator: Some(IntegratorChoice::named(name).unwrap_or_else(|e| panic!("{e}"))),
+            ..RenderSettings::default()
+        };
+        Job::new(&middling, &settings)
+    };
+    assert!(by("path").is_ok());
+    for name in ["bdpt", "lighttrace"] {
+        let Err(Error::Scene(report)) = by(name) else { panic!("{name} was given too much memory") };
+        assert!(report.to_string().contains("E0907"), "{report}");
+    }
     // A part of it is fine.
     let part = RenderSettings { crop: Some([0.0, 0.01, 0.0, 0.01]), ..RenderSettings::default() };
     assert!(Job::new(&file, &part).is_ok());

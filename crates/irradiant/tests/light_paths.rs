@@ -5,7 +5,7 @@
 
 mod estimate;
 
-use estimate::{How, SIGMAS, assert_agree, assert_is, estimate, film, quad};
+use estimate::{How, INSIDE, SIGMAS, assert_agree, assert_is, cube, diffuse, estimate, film, quad};
 use irradiant::{ColorMode, IntegratorChoice, RenderSettings, load_text, render};
 use irradiant_testkit::Mean;
 
@@ -17,30 +17,11 @@ fn by(name: &str, options: &[&str]) -> IntegratorChoice {
 const BDPT: &str = "bdpt";
 const LIGHTTRACE: &str = "lighttrace";
 
-fn diffuse(r: f32, g: f32, b: f32) -> String {
-    format!("Material \"diffuse\" \"rgb reflectance\" [ {r} {g} {b} ]\n")
-}
-
 /// A closed box from -1 to 1, without lights.
 fn walls() -> String {
-    let mut text = String::new();
-    let colors = [[0.7, 0.3, 0.2], [0.2, 0.6, 0.3], [0.7, 0.7, 0.7], [0.5, 0.5, 0.6], [0.6, 0.6, 0.6], [0.7, 0.7, 0.7]];
-    for (i, [r, g, b]) in colors.into_iter().enumerate() {
-        let (axis, side) = (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 });
-        let corner = |u: f32, v: f32| {
-            let mut p = [0.0; 3];
-            p[axis] = side;
-            p[(axis + 1) % 3] = u;
-            p[(axis + 2) % 3] = v;
-            p
-        };
-        text += &diffuse(r, g, b);
-        text += &quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
-    }
-    text
+    cube([[0.7, 0.3, 0.2], [0.2, 0.6, 0.3], [0.7, 0.7, 0.7], [0.5, 0.5, 0.6], [0.6, 0.6, 0.6], [0.7, 0.7, 0.7]])
 }
 
-const INSIDE: &str = "LookAt 0 0 -0.95  0 -0.1 0  0 1 0\nCamera \"perspective\" \"float fov\" 70\n";
 const LAMP: &str = "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 12 9 8 ]\nTranslate 0 0.95 0\nRotate 90 1 0 0\nShape \"disk\" \"float radius\" 0.35\nAttributeEnd\n";
 const GLASS: &str = "AttributeBegin\nMaterial \"dielectric\"\nTranslate 0.3 -0.5 0.2\nShape \"sphere\" \"float radius\" 0.4\nAttributeEnd\n";
 
@@ -61,6 +42,26 @@ fn path_and_bidirectional_agree_in_the_diffuse_box_event_by_event() {
     let path = estimate(&scene, How::new(1024, 9));
     let both = estimate(&scene, How::new(256, 109).by(by(BDPT, &["heuristic=balance"])));
     assert_agree(&both, &path, 0.06, "no depth limit, balance heuristic");
+}
+
+#[test]
+fn path_bidirectional_and_light_tracing_agree_on_the_cornell_box() {
+    // The built-in scene, from measured data, below its lamp, whose edge would be all the noise. It is diffuse throughout, so
+    // that light tracing lacks nothing.
+    let text = include_str!("../../../scenes/cornell-box.pbrt");
+    let sizes = |n: u32| format!("\"integer xresolution\" {n} \"integer yresolution\" {n}");
+    let scene = text
+        .replace(&sizes(512), &(sizes(16) + " \"float cropwindow\" [ 0 1 0.25 1 ]"))
+        .replace("PixelFilter \"gaussian\"", "PixelFilter \"box\"")
+        .replace("Sampler \"zsobol\"", "Sampler \"independent\"");
+    for word in ["cropwindow", "\"box\"", "independent"] {
+        assert!(scene.contains(word), "the built-in scene has changed: no {word}");
+    }
+    let path = estimate(&scene, How::new(1024, 11));
+    let both = estimate(&scene, How::new(512, 12).by(by(BDPT, &[])));
+    assert_agree(&both, &path, 0.03, "Cornell box, bidirectional");
+    let traced = estimate(&scene, How::new(1024, 13).by(by(LIGHTTRACE, &[])));
+    assert_agree(&traced, &path, 0.03, "Cornell box, light tracing");
 }
 
 #[test]
@@ -356,6 +357,50 @@ fn motion_instances_and_interfaces_are_the_same_from_both_ends() {
     assert_agree(&both, &path, 0.04, "bidirectional");
     let traced = estimate(&scene, How::new(2048, 93).depth(3).by(by(LIGHTTRACE, &[])));
     assert_agree(&traced, &path, 0.04, "light tracing");
+}
+
+const MAYBE: &str = "MakeNamedMaterial \"none\" \"string type\" \"interface\"\nMakeNamedMaterial \"dust\" \"string type\" \"diffuse\" \"rgb reflectance\" [ .2 .5 .4 ]\nMakeNamedMaterial \"maybe\" \"string type\" \"mix\" \"string materials\" [ \"dust\" \"none\" ] \"float amount\" 0.6\nNamedMaterial \"maybe\"\n";
+
+#[test]
+fn mixes_that_hold_an_interface_are_passed_from_both_ends_and_by_joins() {
+    // A shell around a ball and one around the lamp, each met where there is dust and passed where there is none; before the
+    // lamp also a lamp of that material, which shines in either case.
+    let shells = format!(
+        "{MAYBE}AttributeBegin\nTranslate 0.3 -0.5 0.2\nShape \"sphere\" \"float radius\" 0.45\nAttributeEnd\nAttributeBegin\nTranslate 0 0.95 0\nShape \"sphere\" \"float radius\" 0.5\nAttributeEnd\nAttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 1 2 3 ] \"bool twosided\" true\nTranslate -0.4 0 0.5\nShape \"disk\" \"float radius\" 0.3\nAttributeEnd\nAttributeBegin\nMaterial \"diffuse\"\nTranslate 0.3 -0.5 0.2\nShape \"sphere\" \"float radius\" 0.3\nAttributeEnd\n"
+    );
+    let scene = in_box(8, &(LAMP.to_string() + &shells));
+    for depth in [1, 3] {
+        let path = estimate(&scene, How::new(6144, 95).depth(depth));
+        let both = estimate(&scene, How::new(1024, 96).depth(depth).by(by(BDPT, &[])));
+        assert_agree(&both, &path, 0.06, "behind interfaces, bidirectional");
+        let traced = estimate(&scene, How::new(2048, 97).depth(depth).by(by(LIGHTTRACE, &[])));
+        assert_agree(&traced, &path, 0.06, "behind interfaces, light tracing");
+    }
+}
+
+#[test]
+fn each_boundary_of_a_mix_decides_by_itself() {
+    // A black shell that lets 60 % pass at each side, in a sky of 1: 36 % of it is seen.
+    let scene = film(4)
+        + "LookAt 0 0 -5  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 10\nWorldBegin\nLightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n"
+        + &MAYBE.replace(".2 .5 .4", "0 0 0")
+        + "Shape \"sphere\"\n";
+    for name in ["path", "simplepath", BDPT, "photon", LIGHTTRACE] {
+        let seen = estimate(&scene, How::new(4096, 98).by(by(name, &[])));
+        assert_is(&seen, [0.36; 3], 0.05, name);
+    }
+    // A point light in it, which no ray meets, over a floor that is seen from within: 60 % of it.
+    let floor = film(4)
+        + "LookAt 0 0.5 0  0 0 0  0 0 1\nCamera \"perspective\" \"float fov\" 1\nWorldBegin\nLightSource \"point\" \"rgb I\" [ 3 3 3 ] \"point3 from\" [ 0 1 0 ]\n"
+        + &diffuse(0.5, 0.5, 0.5)
+        + &quad([[-9.0, 0.0, -9.0], [9.0, 0.0, -9.0], [9.0, 0.0, 9.0], [-9.0, 0.0, 9.0]])
+        + &MAYBE.replace(".2 .5 .4", "0 0 0")
+        + "Translate 0 1 0\nShape \"sphere\" \"float radius\" 0.2\n";
+    let exact = 0.6 * 0.5 / std::f64::consts::PI * 3.0;
+    for name in ["path", "simplepath", BDPT, "photon"] {
+        let seen = estimate(&floor, How::new(4096, 99).depth(1).by(by(name, &[])));
+        assert_is(&seen, [exact; 3], 0.05, name);
+    }
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub use parts::SampleParts;
 pub use splat::SplatEstimate;
 
 use exact::{ExactSum, SquareSum};
-use splat::{Splat, SplatPlane};
+use splat::{Splat, SplatPixel, SplatPlane};
 
 /// What a film keeps beside radiance, channel by channel.
 ///
@@ -324,6 +324,9 @@ impl Film {
     pub const fn bytes_per_pixel(channels: u64) -> u64 {
         size_of::<Pixel>() as u64 + channels.saturating_mul(size_of::<ExactSum>() as u64)
     }
+
+    /// More of it, bytes, where paths from lights bring something ([`FilmTile::splat`]).
+    pub const SPLAT_BYTES_PER_PIXEL: u64 = size_of::<SplatPixel>() as u64;
 
     /// Width and height of the image that this is a (perhaps cropped) film of.
     pub fn full_resolution(&self) -> [u32; 2] {

@@ -80,6 +80,12 @@ impl Materials {
         c.check_mixes(&mut entries);
         let (normal_maps, coat_depth_limit) = (c.normal_maps, c.coat_depth_limit);
         let coats: Vec<Coat> = c.coats.par_iter().map(CoatPlan::make).collect();
+        let may_pass = entries.iter().any(|entry| match entry.material {
+            Material::Mix { materials, .. } => materials
+                .iter()
+                .any(|id| entries.get(id.0 as usize).is_none_or(|part| matches!(part.material, Material::Interface))),
+            _ => false,
+        });
         let pbrt_coat_weights = c.pbrt_coat_weights || coats.iter().any(Coat::has_pbrt_weights);
         let names = desc.materials.iter().map(|m| m.name.clone().unwrap_or_else(|| kind_name(&m.kind).into()));
         Self {
@@ -90,6 +96,7 @@ impl Materials {
             force_diffuse: desc.options.force_diffuse,
             coat_depth_limit,
             pbrt_coat_weights,
+            may_pass,
         }
     }
 }

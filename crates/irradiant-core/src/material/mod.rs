@@ -27,7 +27,7 @@ use crate::bxdf::{
 use crate::interaction::{Interaction, MaterialId, TextureContext};
 use crate::sampler::MixDraw;
 use crate::texture::{FloatValue, SpectrumValue, Textures};
-use irradiant_math::Frame;
+use irradiant_math::{Frame, hash};
 use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 use relief::{NormalMap, Relief};
 
@@ -339,16 +339,24 @@ pub struct Materials {
     force_diffuse: bool,
     coat_depth_limit: Option<u32>,
     pbrt_coat_weights: bool,
+    /// Some mix may come to an interface.
+    may_pass: bool,
+}
+
+/// A number in [0, 1) from a place.
+fn turned(place: u64) -> f32 {
+    hash::unit_f32_from_hash(hash::hash_words([place]))
 }
 
 /// Samples with which a material's albedo is estimated when all are forced to be diffuse.
 const FORCED_DIFFUSE_SAMPLES: u32 = 16;
 
 impl Materials {
-    /// True where there is no surface at all, only a boundary: rays pass it as they are.
+    /// Whether rays may pass a surface as if it were not there: where a mix comes to an interface by chance. (What is an
+    /// interface and nothing else is no part of the geometry.)
     #[inline]
-    pub fn is_interface(&self, id: MaterialId) -> bool {
-        self.entries.get(id.0 as usize).is_none_or(|entry| matches!(entry.material, Material::Interface))
+    pub fn may_pass(&self) -> bool {
+        self.may_pass
     }
 
     /// Whether a material looks anything up in textures, so that it needs to know how large a pixel is where it is met.
@@ -357,9 +365,33 @@ impl Materials {
         self.entries.get(id.0 as usize).is_some_and(|entry| entry.is_textured)
     }
 
-    /// Whether any material is an interface.
-    pub fn has_interfaces(&self) -> bool {
-        self.entries.iter().any(|entry| matches!(entry.material, Material::Interface))
+    /// Whether a segment passes this surface: with the chance that mixes there come to an interface, decided by the place.
+    pub fn passes(&self, id: MaterialId, textures: &Textures, at: &Interaction, tex: &TextureContext) -> bool {
+        let number = |level: u32| turned(hash::hash_point(at.p) ^ u64::from(level + 1));
+        match self.resolved(id, textures, tex, number) {
+            Some(entry) => matches!(entry.material, Material::Interface),
+            None => true,
+        }
+    }
+
+    /// What a material is once chance has decided its mixes; `number` is asked for each mix inside the other.
+    #[inline]
+    fn resolved(
+        &self,
+        id: MaterialId,
+        textures: &Textures,
+        tex: &TextureContext,
+        number: impl Fn(u32) -> f32,
+    ) -> Option<&Entry> {
+        let mut entry = self.entries.get(id.0 as usize)?;
+        let mut level = 0;
+        while let Material::Mix { materials, amount } = entry.material {
+            let amount = textures.float(amount, tex);
+            let second = amount >= 1.0 || (amount > 0.0 && number(level) <= amount);
+            level += 1;
+            entry = self.entries.get(materials[usize::from(second)].0 as usize)?;
+        }
+        Some(entry)
     }
 
     /// How light scatters at a hit; `None` where there is no surface (an interface, or no such material).
@@ -376,14 +408,13 @@ impl Materials {
         lambda: &mut Wavelengths,
         mix: MixDraw<'_>,
     ) -> Option<Bsdf> {
-        let mut entry = self.entries.get(id.0 as usize)?;
-        let mut level = 0;
-        while let Material::Mix { materials, amount } = entry.material {
-            let amount = textures.float(amount, tex);
-            let second = amount >= 1.0 || (amount > 0.0 && mix.get(level) <= amount);
-            level += 1;
-            entry = self.entries.get(materials[usize::from(second)].0 as usize)?;
-        }
+        // A path that passes surfaces comes to several with the same numbers: there the place has a say too.
+        let turn = if self.may_pass { turned(hash::hash_point(at.p)) } else { 0.0 };
+        let number = |level| {
+            let u = mix.get(level) + turn;
+            if u < 1.0 { u } else { u - 1.0 }
+        };
+        let entry = self.resolved(id, textures, tex, number)?;
         let frame = match entry.relief {
             Relief::Flat => Frame::from_z_near_x(at.ns.as_vec(), at.dpdus),
             Relief::Bump(height) => relief::bump(height, textures, at, tex),

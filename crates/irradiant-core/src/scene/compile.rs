@@ -35,6 +35,8 @@ pub struct CompileOptions {
     pub seed: Option<u64>,
     /// How lights are picked.
     pub light_sampler: Option<LightSamplerKind>,
+    /// Whether paths from lights will bring something to the film, for which it takes memory.
+    pub splats: bool,
     /// Films that would take more memory than this, bytes, are refused before anything is reserved.
     pub max_film_bytes: u64,
 }
@@ -53,6 +55,7 @@ impl Default for CompileOptions {
             samples_per_pixel: None,
             seed: None,
             light_sampler: None,
+            splats: false,
             max_film_bytes: Self::MAX_FILM_BYTES,
         }
     }
@@ -97,7 +100,7 @@ fn compile(
     if options.crop.is_some() {
         (film.crop_window, film.pixel_bounds) = (options.crop.map(Spanned::unplaced), None);
     }
-    let bounds = pixel_bounds(&film, diagnostics).filter(|b| fits(b, &film, options.max_film_bytes, diagnostics));
+    let bounds = pixel_bounds(&film, diagnostics).filter(|b| fits(b, &film, options, diagnostics));
     check_filter(desc, diagnostics);
     check_buckets(&film, diagnostics);
     let samples_per_pixel = options.samples_per_pixel.unwrap_or(desc.sampler.samples_per_pixel.value).max(1);
@@ -241,8 +244,10 @@ fn pixel_bounds(film: &FilmDesc, diagnostics: &mut Diagnostics) -> Option<PixelB
 }
 
 /// Complains of a film that is too large for the memory it may take; says what to do.
-fn fits(bounds: &PixelBounds, film: &FilmDesc, limit: u64, diagnostics: &mut Diagnostics) -> bool {
-    let bytes = (bounds.area() as u64).saturating_mul(Film::bytes_per_pixel(LayerPlan::channels_of(film)));
+fn fits(bounds: &PixelBounds, film: &FilmDesc, options: &CompileOptions, diagnostics: &mut Diagnostics) -> bool {
+    let (limit, of_splats) = (options.max_film_bytes, if options.splats { Film::SPLAT_BYTES_PER_PIXEL } else { 0 });
+    let per_pixel = Film::bytes_per_pixel(LayerPlan::channels_of(film)) + of_splats;
+    let bytes = (bounds.area() as u64).saturating_mul(per_pixel);
     if bytes > limit {
         // Small limits deserve small units.
         let size = |bytes: u64| match bytes {

@@ -5,7 +5,7 @@ use super::Scene;
 use crate::camera::CameraConnection;
 use crate::film::Layer;
 use crate::interaction::{Interaction, LightId, TextureContext};
-use crate::light::{EmittedRay, Light, Lights};
+use crate::light::{EmittedRay, Light, LightSample, LightTarget, Lights};
 use crate::light_sampler::PickedLight;
 use irradiant_math::distribution::AliasTable;
 use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3};
@@ -80,36 +80,45 @@ impl Scene {
         })
     }
 
-    /// True when nothing stands between a surface point and another point (`n` its normal, zero in space); interfaces,
-    /// which are no surfaces, do not count.
+    /// True when nothing stands between a surface point and another point (`n` its normal, zero in space). Where a mix
+    /// holds an interface the segment passes with the chance that a path's ray does.
     pub fn is_visible(&self, at: &Interaction, p: Point3, p_error: Vec3, n: Normal3) -> bool {
-        let mut segment = at.spawn_ray_to(p, p_error, n);
-        if !self.materials.has_interfaces() {
-            return !self.geometry.occluded_between(&segment, &self.alpha());
+        let segment = at.spawn_ray_to(p, p_error, n);
+        if self.materials.may_pass() {
+            return self.is_passable(segment, 1.0, |boundary| boundary.spawn_ray_to(p, p_error, n));
         }
-        loop {
-            let Some(hit) = self.geometry.intersect(&segment, 1.0, &self.alpha()) else { return true };
-            let boundary = self.geometry.interaction(&segment, &hit);
-            if !self.materials.is_interface(boundary.material) {
-                return false;
-            }
-            segment = boundary.spawn_ray_to(p, p_error, n);
-        }
+        !self.geometry.occluded_between(&segment, &self.alpha())
     }
 
     /// As [`Scene::is_visible`], out of the scene in direction `w`.
     pub fn is_open(&self, at: &Interaction, w: Vec3) -> bool {
-        let mut ray = at.spawn_ray(w);
-        if !self.materials.has_interfaces() {
-            return !self.geometry.occluded(&ray, f32::INFINITY, &self.alpha());
+        let ray = at.spawn_ray(w);
+        if self.materials.may_pass() {
+            return self.is_passable(ray, f32::INFINITY, |boundary| boundary.spawn_ray(w));
         }
+        !self.geometry.occluded(&ray, f32::INFINITY, &self.alpha())
+    }
+
+    /// True when nothing stands between a surface point and the end of a light sample, as [`Scene::is_visible`] sees it.
+    pub fn is_lit(&self, at: &Interaction, sample: &LightSample) -> bool {
+        match sample.target {
+            LightTarget::Infinite => self.is_open(at, sample.wi),
+            LightTarget::Point(p) => self.is_visible(at, p, Vec3::ZERO, Normal3::ZERO),
+            LightTarget::Surface { p, p_error, n, .. } => self.is_visible(at, p, p_error, n),
+        }
+    }
+
+    /// True when each surface on the way lets pass; `beyond` is the rest of the way behind one.
+    #[cold]
+    fn is_passable(&self, mut ray: Ray, end: f32, beyond: impl Fn(&Interaction) -> Ray) -> bool {
         loop {
-            let Some(hit) = self.geometry.intersect(&ray, f32::INFINITY, &self.alpha()) else { return true };
+            let Some(hit) = self.geometry.intersect(&ray, end, &self.alpha()) else { return true };
             let boundary = self.geometry.interaction(&ray, &hit);
-            if !self.materials.is_interface(boundary.material) {
+            let footprint = self.texture_context(&boundary, None);
+            if !self.materials.passes(boundary.material, &self.textures, &boundary, &footprint) {
                 return false;
             }
-            ray = boundary.spawn_ray(w);
+            ray = beyond(&boundary);
         }
     }
 

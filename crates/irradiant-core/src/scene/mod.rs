@@ -194,9 +194,13 @@ impl Scene {
         }
     }
 
-    /// True when something stands between a surface point and the end of a light sample.
+    /// True when something stands between a surface point and the end of a light sample. What lies behind a mix that holds an
+    /// interface is left to rays that meet it, but for lights that no ray meets.
     #[inline]
     pub fn is_occluded(&self, at: &Interaction, sample: &LightSample) -> bool {
+        if sample.is_delta && self.materials.may_pass() {
+            return !self.is_lit(at, sample);
+        }
         match sample.target {
             LightTarget::Infinite => self.geometry.occluded(&at.spawn_ray(sample.wi), f32::INFINITY, &self.alpha()),
             LightTarget::Point(p) => {

@@ -8,7 +8,7 @@ use crate::integrator::RenderStats;
 use crate::light_trace::Splats;
 use crate::light_walk::shading_correction;
 use irradiant_core::bxdf::{Sides, TransportMode};
-use irradiant_core::interaction::LightId;
+use irradiant_core::interaction::{Interaction, LightId};
 use irradiant_core::light::{Light, LightHit, LightTarget, SampleMode};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Normal3, Point2, Point3, Vec3};
@@ -44,8 +44,11 @@ impl BidirectionalIntegrator {
         densities.lens_can_be_joined = lens_can_be_joined;
         let mut radiance = SampledSpectrum::ZERO;
         // Lamps and skies that the camera's walk has met.
-        for k in 0..walks.camera.len() {
-            radiance += self.met(scene, walks, k, lambda, densities);
+        for (k, v) in walks.camera.iter().enumerate() {
+            radiance += self.met(scene, walks, k, (&v.at, v.carried, v.forward), lambda, densities);
+        }
+        for v in &walks.passed {
+            radiance += self.met(scene, walks, v.surfaces, (&v.at, v.carried, v.forward), lambda, densities);
         }
         if walks.escape.is_some() {
             radiance += self.escaped(scene, walks, lambda, densities);
@@ -68,32 +71,33 @@ impl BidirectionalIntegrator {
         radiance
     }
 
-    /// Emission of the camera's `k`th surface: strategy s = 0.
+    /// Emission of what the camera's walk has met after `k` surfaces (where, what it carries, with which density): strategy
+    /// s = 0.
     fn met(
         &self,
         scene: &Scene,
         walks: &Walks,
         k: usize,
+        (at, carried, forward): (&Interaction, SampledSpectrum, f32),
         lambda: &Wavelengths,
         densities: &mut PathDensities,
     ) -> SampledSpectrum {
-        let here = &walks.camera[k];
-        let Some(id) = here.at.light.filter(|_| self.wants(0, k + 2)) else { return SampledSpectrum::ZERO };
+        let Some(id) = at.light.filter(|_| self.wants(0, k + 2)) else { return SampledSpectrum::ZERO };
         let light = scene.lights.get(id);
-        let emitted = light.emitted(here.at.n, here.at.uv, here.at.wo, lambda) * here.carried;
+        let emitted = light.emitted(at.n, at.uv, at.wo, lambda) * carried;
         if emitted.is_black() {
             return emitted;
         }
         let weight = || {
             let before = k.checked_sub(1).map(|k| &walks.camera[k]);
-            let to_light = -here.at.wo;
+            let to_light = -at.wo;
             let by_sample = before.filter(|b| !b.delta).map_or(0.0, |b| {
                 let reference = b.at.reference();
-                let pdf = light.pdf_hit(&reference, to_light, &(&here.at).into());
-                per_area(scene.light_sampler.pmf(&reference, id) * pdf, b.at.p, here.at.p, here.at.n)
+                let pdf = light.pdf_hit(&reference, to_light, &at.into());
+                per_area(scene.light_sampler.pmf(&reference, id) * pdf, b.at.p, at.p, at.n)
             });
-            let hit = LightHit::from(&here.at);
-            let end = End { light: id, hit, infinite: false, to_light, by_walk: here.forward, by_sample };
+            let hit = LightHit::from(at);
+            let end = End { light: id, hit, infinite: false, to_light, by_walk: forward, by_sample };
             self.weight_of_met(scene, walks, k, &end, densities)
         };
         self.share(0, k + 2, weight).map_or(SampledSpectrum::ZERO, |share| emitted * share)
@@ -183,12 +187,7 @@ impl BidirectionalIntegrator {
             return black;
         }
         stats.shadow_rays += 1;
-        let visible = match s.target {
-            LightTarget::Infinite => scene.is_open(&here.at, s.wi),
-            LightTarget::Point(p) => scene.is_visible(&here.at, p, Vec3::ZERO, Normal3::ZERO),
-            LightTarget::Surface { p, p_error, n, .. } => scene.is_visible(&here.at, p, p_error, n),
-        };
-        if !visible {
+        if !scene.is_lit(&here.at, &s) {
             return black;
         }
         let weight = || {

@@ -113,6 +113,10 @@ impl Integrator for BidirectionalIntegrator {
         splats.into_tile(tile);
     }
 
+    fn splats(&self) -> bool {
+        true
+    }
+
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
         let part = self.shown.map(|_| Limit::OtherQuantity("one strategy of the bidirectional estimator"));

@@ -27,6 +27,16 @@ pub(super) struct Vertex {
     pub delta: bool,
 }
 
+/// A lamp that the camera's walk has passed because its material, a mix, came to an interface: it shines and scatters
+/// nothing.
+pub(super) struct Passed {
+    pub at: Interaction,
+    /// Surfaces before it.
+    pub surfaces: usize,
+    pub carried: SampledSpectrum,
+    pub forward: f32,
+}
+
 /// How a walk from the camera ended, if it left the scene.
 pub(super) struct Escape {
     pub ray: Ray,
@@ -51,6 +61,8 @@ pub(super) struct LightEnd {
 pub(super) struct Walks {
     /// Surfaces from the camera on: the first is what it looks at.
     pub camera: Vec<Vertex>,
+    /// Lamps that the camera's walk has met and passed.
+    pub passed: Vec<Passed>,
     /// How the camera's walk left the scene.
     pub escape: Option<Escape>,
     /// The light.
@@ -105,6 +117,7 @@ impl BidirectionalIntegrator {
         let mut eta_scale = 1.0;
         let mut pdf = 0.0;
         walks.escape = None;
+        walks.passed.clear();
         camera.clear();
         loop {
             let depth = camera.len() as u32;
@@ -115,7 +128,17 @@ impl BidirectionalIntegrator {
             let at = scene.geometry.interaction(&ray, &hit);
             let footprint = scene.texture_context(&at, None);
             let mix = sample.stream.mix(depth);
-            let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+            let bsdf = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix);
+            let forward = match camera.last() {
+                None => self.camera_density(scene, camera_ray.ray.o, at.p, at.n, |distance| {
+                    scene.camera.film_area(&camera_ray.ray, distance)
+                }),
+                Some(previous) => per_area(pdf, previous.at.p, at.p, at.n),
+            };
+            let Some(bsdf) = bsdf else {
+                if at.light.is_some() {
+                    walks.passed.push(Passed { at, surfaces: camera.len(), carried, forward });
+                }
                 ray = at.spawn_ray(ray.d);
                 stats.bounce_rays += 1;
                 continue;
@@ -123,12 +146,6 @@ impl BidirectionalIntegrator {
             if depth == 0 && !layers.is_empty() {
                 scene.layers.fill(layers, scene, camera_ray, &at, &footprint, &bsdf, lambda);
             }
-            let forward = match camera.last() {
-                None => self.camera_density(scene, camera_ray.ray.o, at.p, at.n, |distance| {
-                    scene.camera.film_area(&camera_ray.ray, distance)
-                }),
-                Some(previous) => per_area(pdf, previous.at.p, at.p, at.n),
-            };
             camera.push(Vertex { at, bsdf, carried, forward, reverse: 0.0, delta: false });
             if self.max_depth.is_some_and(|limit| depth >= limit) {
                 break;

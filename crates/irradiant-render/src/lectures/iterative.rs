@@ -21,15 +21,12 @@
 //! Its notes recommend q1 = q2 = 0, then q = 0.5 (B25): the default here, and where surfaces are bright a variance that is not finite
 //! (see [`super::roulette`]).
 
-use super::SAMPLES;
-use super::direct_light::{LIGHTS, SHADOW};
-use super::directions::{DIRECTIONS, GLASS};
 use super::emission::{EmissionRule, Previous};
-use super::partitioned::PathOptions;
-use super::roulette::{Policy, Q, STOP, spared};
+use super::path_options::PathOptions;
+use super::roulette::Policy;
 use super::walk::{self, Walk};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use crate::registry::{IntegratorEntry, LIGHT_SAMPLER};
+use crate::registry::IntegratorEntry;
 use irradiant_core::film::FilmTile;
 use irradiant_core::scene::Scene;
 use irradiant_spectrum::SampledSpectrum;
@@ -39,19 +36,7 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "iterative",
     promise: "one path extended step by step and lit at each vertex, all its beginnings reused; as printed, no emission counts",
     source: "lecture B, B22 to B25 \"Path tracing pseudocode\"",
-    options: &[
-        EmissionRule::Never.option(),
-        LIGHTS,
-        SAMPLES,
-        SHADOW,
-        LIGHT_SAMPLER,
-        DIRECTIONS,
-        GLASS,
-        Policy::Constant.option(),
-        Q,
-        spared(2),
-        STOP,
-    ],
+    options: &PathOptions::entries(EmissionRule::Never, Policy::Constant, 2),
     make: |options, max_depth| Box::new(IterativeIntegrator(PathOptions::of(options, max_depth))),
 };
 

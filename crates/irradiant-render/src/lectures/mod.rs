@@ -27,6 +27,7 @@ pub mod distribution;
 pub mod emission;
 pub mod iterative;
 pub mod partitioned;
+pub mod path_options;
 pub mod per_length;
 pub mod roulette;
 pub mod tries;

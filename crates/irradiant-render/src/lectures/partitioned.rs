@@ -23,14 +23,12 @@
 //!   `emission=eye` to see that. The remedy is lecture B's (B38), `emission=specular`; `emission=power` is the better one (B32), and
 //!   `emission=always`, the rule switched off, counts direct light twice where surfaces are diffuse.
 
-use super::direct_light::{DirectLight, LIGHTS, SHADOW};
-use super::directions::{DIRECTIONS, Directions, GLASS};
 use super::emission::{EmissionRule, Previous};
-use super::roulette::{Policy, Q, Roulette, STOP, spared};
+use super::path_options::PathOptions;
+use super::roulette::Policy;
 use super::walk::{self, Vertex, Walk};
-use super::{SAMPLES, depth_limit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, Options};
+use crate::registry::IntegratorEntry;
 use irradiant_core::film::FilmTile;
 use irradiant_core::scene::Scene;
 use irradiant_spectrum::SampledSpectrum;
@@ -40,65 +38,9 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "partitioned",
     promise: "direct light by light samples, indirect light by recursion with roulette; as printed, emission counts for the eye alone",
     source: "lecture A, A52 to A54 \"Path Tracing Pseudocode\"",
-    options: &[
-        EmissionRule::Eye.option(),
-        LIGHTS,
-        SAMPLES,
-        SHADOW,
-        LIGHT_SAMPLER,
-        DIRECTIONS,
-        GLASS,
-        Policy::Bsdf.option(),
-        Q,
-        spared(0),
-        STOP,
-    ],
+    options: &PathOptions::entries(EmissionRule::Eye, Policy::Bsdf, 0),
     make: |options, max_depth| Box::new(PartitionedIntegrator(PathOptions::of(options, max_depth))),
 };
-
-/// What can be set on the lectures' path tracers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathOptions {
-    /// Scattering events at most.
-    pub max_depth: Option<u32>,
-    /// When light counts that a ray meets.
-    pub emission: EmissionRule,
-    /// How lights are sampled.
-    pub lights: DirectLight,
-    /// Where rays go.
-    pub directions: Directions,
-    /// When they end.
-    pub roulette: Roulette,
-}
-
-impl PathOptions {
-    /// As an entry's options say.
-    pub fn of(options: &Options, max_depth: Option<u32>) -> Self {
-        Self {
-            max_depth,
-            emission: EmissionRule::of(options.word("emission")),
-            lights: DirectLight::of(options),
-            directions: Directions::of(options),
-            roulette: Roulette::of(options),
-        }
-    }
-
-    /// What they leave out or change.
-    pub fn limits(&self) -> Vec<Limit> {
-        depth_limit(self.max_depth)
-            .chain(self.roulette.limit(self.max_depth))
-            .chain(self.emission.limit())
-            .chain(self.lights.limit())
-            .collect()
-    }
-
-    /// Whether scattering is cut off after `depth` events; counts the paths that the safety stop ends.
-    pub fn ends(&self, walk: &mut Walk, depth: u32) -> bool {
-        let stopped = self.roulette.stops(depth) && self.max_depth.is_none_or(|limit| depth < limit);
-        walk.stats.stopped_paths += u64::from(stopped);
-        stopped || self.max_depth.is_some_and(|limit| depth >= limit)
-    }
-}
 
 /// The recursion of the slide.
 #[derive(Clone, Copy, Debug, PartialEq)]

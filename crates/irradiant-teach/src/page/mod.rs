@@ -55,7 +55,8 @@ fn word(verdict: &Verdict) -> (&'static str, &'static str) {
 
 fn picture(p: &Picture) -> String {
     format!(
-        "<figure><img alt=\"{}\" width=\"{}\" height=\"{}\" src=\"data:image/png;base64,{}\"><figcaption>{}</figcaption></figure>\n",
+        "<figure style=\"--aspect:{:.3}\"><img alt=\"{}\" width=\"{}\" height=\"{}\" src=\"data:image/png;base64,{}\"><figcaption>{}</figcaption></figure>\n",
+        p.width as f64 / p.height.max(1) as f64,
         escaped(&p.caption),
         p.width,
         p.height,

@@ -172,7 +172,7 @@ pub fn challenging(c: &Context) -> Result<Outcome, Error> {
     // Why: no light sample finds what comes by way of the ring or the glass, and chance hardly ever does.
     let setup = Setup { size: Some(task.size), spp: Some(c.spp(96)), ..Setup::default() };
     let scene = c.scene(task.scene, task.text, setup)?;
-    let production = crate::estimate::Production { max_depth: Some(8) };
+    let production = crate::estimate::Production::limited(8);
     let classify = |p: &crate::estimate::Part| (!p.by_hit).then_some(0);
     let sampled = crate::estimate::take_apart(&scene, &production, c.spp(96), 1, &classify).swap_remove(0);
     let lost = 1.0 - sampled.grey() / reference.grey();

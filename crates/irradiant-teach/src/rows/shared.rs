@@ -27,19 +27,30 @@ pub fn cornell_by_bounce(context: &Context) -> Result<Arc<ByBounce>, Error> {
         let setup = Setup::square(context.side(64), context.spp(96));
         let scene = context.scene("cornell-box", &scenes::cornell(), setup)?;
         let classify = |part: &Part| Some((part.bounces as usize).min(BOUNCES));
-        let mut parts = take_apart(&scene, &Production { max_depth: None }, context.spp(96), BOUNCES + 1, &classify);
+        let mut parts = take_apart(&scene, &Production::default(), context.spp(96), BOUNCES + 1, &classify);
         let (whole, beyond) = (parts.pop().unwrap_or_default(), parts.pop().unwrap_or_default());
         Ok(ByBounce { terms: parts, beyond, whole })
     })
 }
 
-/// The room with two balls, taken apart: emitted and direct light, caustics, the rest; then the whole.
+/// The room with two balls, taken apart: emitted and direct light, caustics, the rest; the whole; and of the caustics those
+/// that are seen straight, L S+ D E.
 pub fn balls_apart(context: &Context) -> Result<Arc<Vec<Estimate>>, Error> {
     context.once("two balls apart", || {
         let spp = context.spp(96);
         let setup = Setup { size: Some([context.side(80), context.side(60)]), spp: Some(spp), ..Setup::default() };
         let scene = context.scene("two-balls", scenes::TWO_BALLS, setup)?;
-        Ok(take_apart(&scene, &Production { max_depth: None }, spp, 3, &|part| Some(kind_of_light(part))))
+        let classify = |part: &Part| match kind_of_light(part) {
+            1 if part.lobes[0].is_specular() => Some(3),
+            kind => Some(kind),
+        };
+        let mut parts = take_apart(&scene, &Production::default(), spp, 4, &classify);
+        let straight = parts[1].clone();
+        // Of one run, and nearly independent: hardly a path brings both.
+        parts[1] = straight.plus(1.0, &parts[3]);
+        parts.swap_remove(3);
+        parts.push(straight);
+        Ok(parts)
     })
 }
 

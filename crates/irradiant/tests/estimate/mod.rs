@@ -136,6 +136,7 @@ pub fn assert_agree(a: &Estimate, b: &Estimate, power: f64, what: &str) {
     for (c, (x, y)) in a.total().into_iter().zip(b.total()).enumerate() {
         let se = x.1.hypot(y.1);
         let visible = (SIGMAS + 2.0) * se / y.0.abs();
+        told(what, c, (x.0 - y.0) / se, visible);
         assert!(visible <= power, "{what}: only a bias of {:.2} % would be seen in channel {c}", 100.0 * visible);
         assert!(
             (x.0 - y.0).abs() <= SIGMAS * se + 1e-6 * y.0.abs(),
@@ -162,11 +163,19 @@ pub fn assert_agree(a: &Estimate, b: &Estimate, power: f64, what: &str) {
     }
 }
 
+/// A line for `--nocapture`.
+fn told(what: &str, channel: usize, z: f64, visible: f64) {
+    if channel == 1 {
+        eprintln!("{what}: z {z:.2}; would see a bias of {:.2} %", 100.0 * visible);
+    }
+}
+
 /// Panics unless every channel's mean is `expected` and a bias of `power` (relative) would have been seen.
 #[track_caller]
 pub fn assert_is(a: &Estimate, expected: [f64; 3], power: f64, what: &str) {
     for (c, (mean, se)) in a.total().into_iter().enumerate() {
         let visible = (SIGMAS + 2.0) * se / expected[c].abs();
+        told(what, c, (mean - expected[c]) / se, visible);
         assert!(visible <= power, "{what}: only a bias of {:.2} % would be seen in channel {c}", 100.0 * visible);
         // f32 transport rounds by some 1e-6.
         let allowed = SIGMAS * se + 1e-5 * expected[c].abs();

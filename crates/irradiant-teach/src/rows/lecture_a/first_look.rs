@@ -1,6 +1,7 @@
 //! What the lecture opens with: shadows, caustics, inter-reflection, richness (A01 to A09).
 
 use super::super::shared::{balls_apart, cornell_by_bounce, kind_of_light, strip};
+use crate::caustic::caustic;
 use crate::context::{Context, Setup};
 use crate::estimate::{Estimate, take_apart, whole};
 use crate::row::{Outcome, Row};
@@ -31,7 +32,7 @@ pub const ROWS: &[Row] = &[
         id: "A03",
         name: "+ Caustics",
         says: "Specular things focus light onto others.",
-        check: "Direct light and the layer L S+ D S* E from one run add up to what an estimator without light samples finds for both.",
+        check: "Direct light and the layer L S+ D S* E from one run add up to what an estimator without light samples finds for both; L S+ D E is what paths from the lamp bring.",
         run: caustics,
     },
     Row {
@@ -196,7 +197,16 @@ fn caustics(c: &Context) -> Result<Outcome, Error> {
     sheet.agree("direct + caustics against both at once", &parts[0].plus(1.0, &parts[1]), &both, 0.05);
     let share = parts[1].grey() / parts[3].grey();
     sheet.at_least("caustics' share of the picture", share, 0.01);
-    sheet.picture("A03-caustics", "L S+ D S* E alone: light gathered by glass and mirror.", &parts[1].image(), 1.0);
+    // The other way round: paths from the lamp.
+    let from_the_lamp = caustic(&*c.scene("two-balls", scenes::TWO_BALLS, setup)?, c.spp(128));
+    sheet.agree("L S+ D E by paths from the eye and from the lamp", &parts[4], &from_the_lamp, 0.25);
+    let side_by_side = strip(&[&parts[4].image(), &from_the_lamp.image()]);
+    sheet.picture(
+        "A03-caustics",
+        "L S+ D E alone, light gathered by glass and mirror: by paths from the eye, which meet the lamp by chance, and by paths from the lamp.",
+        &side_by_side,
+        1.0,
+    );
     sheet.command(c.command("two-balls", "--aov \"caustic=LS+DS*E\""));
     Ok(sheet.finish())
 }
@@ -253,7 +263,10 @@ fn sun_sky(side: usize) -> Image {
             return [9000.0, 7800.0, 6000.0];
         }
         let up = d.z.max(0.0);
-        if d.z > 0.0 { [0.55 - 0.35 * up, 0.7 - 0.3 * up, 0.95 - 0.2 * up] } else { [0.25, 0.23, 0.2] }
+        let (sky, ground) = ([0.55 - 0.35 * up, 0.7 - 0.3 * up, 0.95 - 0.2 * up], [0.25, 0.23, 0.2]);
+        // The horizon is hazy: a sharp one would show the map's pixels.
+        let t = (0.5 + d.z / 0.12).clamp(0.0, 1.0);
+        std::array::from_fn(|c| ground[c] + t * t * (3.0 - 2.0 * t) * (sky[c] - ground[c]))
     })
 }
 

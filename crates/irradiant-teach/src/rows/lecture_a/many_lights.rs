@@ -168,6 +168,7 @@ fn one_light(c: &Context) -> Result<Outcome, Error> {
     sheet.command(
         c.command("lamps-bvh", "--integrator partitioned --estimator lights=resampled --estimator samples=16"),
     );
+    sheet.note("Selectors that learn from the render, and splitting in the tree (several lights of one walk down it), are not built.");
     sheet.command(c.command("lamps-bvh", "--spp 64"));
     Ok(sheet.finish())
 }

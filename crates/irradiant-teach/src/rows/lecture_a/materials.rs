@@ -127,7 +127,7 @@ fn reflection(c: &Context) -> Result<Outcome, Error> {
         let Some(ray) = sample.camera_ray else { continue };
         let mut stats = Default::default();
         let l = crate::estimate::Estimator::sample(
-            &Production { max_depth: None },
+            &Production::default(),
             &scene,
             &ray,
             &sample.stream,
@@ -310,7 +310,7 @@ fn mirror(c: &Context) -> Result<Outcome, Error> {
         let mut stats = Default::default();
         let mut own = sample.lambda;
         let got = crate::estimate::Estimator::sample(
-            &Production { max_depth: None },
+            &Production::default(),
             &scene,
             &camera_ray,
             &sample.stream,
@@ -434,7 +434,7 @@ fn furnace_of(c: &Context, roughness: &[(&str, &str)], material: &str, bound: f6
         let spp = c.spp(512);
         let e = whole(
             &*c.scene(&format!("{material}-furnace"), &white_sky(16, &things), Setup::square(16, spp))?,
-            &Production { max_depth: None },
+            &Production::default(),
             spp,
         );
         let (mean, se) = e.total()[1];

@@ -99,7 +99,7 @@ fn cornell_walls(c: &Context) -> Result<Outcome, Error> {
     let down = Vec3::new(0.0, -1.0, 0.0);
     let normal = irradiant::math::Normal3::new(0.0, -1.0, 0.0);
     let le = lamp.emitted(normal, irradiant::math::Point2::new(0.5, 0.5), down, &lambda);
-    let production = Production { max_depth: None };
+    let production = Production::default();
     let names = [
         "lamp",
         "floor",
@@ -164,7 +164,7 @@ fn samples(c: &Context) -> Result<Outcome, Error> {
         let mut square = Mean::new();
         for _ in 0..repeats {
             let scene = c.scene("disk-lamp", &text, Setup::square(32, spp))?;
-            let e = whole(&scene, &Production { max_depth: Some(1) }, spp);
+            let e = whole(&scene, &Production::limited(1), spp);
             e.mean.iter().for_each(|p| square.add((p[1] - expected).powi(2)));
         }
         Ok(square.mean().sqrt())
@@ -202,7 +202,7 @@ fn sky_lit(c: &Context) -> Result<Outcome, Error> {
     let run = |sampler: &str, spp: u32| -> Result<f64, Error> {
         let text = text.replace("\"independent\"", sampler);
         let run = || -> Result<Estimate, Error> {
-            Ok(whole(&*c.scene("sky-lit", &text, Setup::square(24, spp))?, &Production { max_depth: Some(5) }, spp))
+            Ok(whole(&*c.scene("sky-lit", &text, Setup::square(24, spp))?, &Production::limited(5), spp))
         };
         Ok(run()?.rmse(&run()?) / 2f64.sqrt())
     };

@@ -95,6 +95,9 @@ fn roulette(c: &Context) -> Result<Outcome, Error> {
         sheet.agree(&format!("{name}: with roulette, and without to depth {depth}"), &with, &without, 0.12);
         let mean = |e: &Estimate| e.stats.scatterings as f64 / e.stats.paths as f64;
         sheet.at_most(&format!("{name}: mean path length, with over without"), mean(&with) / mean(&without), 0.9);
+        if c.noticed(&sheet) {
+            return Ok(sheet.finish());
+        }
     }
     Ok(sheet.finish())
 }
@@ -154,7 +157,7 @@ fn how_many(c: &Context) -> Result<Outcome, Error> {
         );
     }
     let scene = c.scene("cornell-box", &scenes::cornell(), Setup::square(16, spp))?;
-    let e = whole(&scene, &Production { max_depth: None }, spp);
+    let e = whole(&scene, &Production::default(), spp);
     let mean = e.stats.scatterings as f64 / e.stats.paths as f64;
     sheet.between("Cornell box: production's mean path length", mean, [2.0, 9.0]);
     sheet.note(format!("Its longest of {} paths has {} events.", e.stats.paths, e.stats.longest_path));
@@ -181,7 +184,7 @@ fn try_2(c: &Context) -> Result<Outcome, Error> {
     let run = |walk: &dyn Estimator, spp: u32| -> Result<Estimate, Error> {
         Ok(reflected(&*c.scene("cornell-box", &scenes::cornell(), Setup::square(32, spp))?, walk, spp))
     };
-    let (two, path) = (run(&Walk::TRY_2, 2 * spp)?, run(&Production { max_depth: None }, spp / 4)?);
+    let (two, path) = (run(&Walk::TRY_2, 2 * spp)?, run(&Production::default(), spp / 4)?);
     sheet.agree("try 2 and the path tracer", &two, &path, 0.2);
     let ratio = two.sample_variance() / path.sample_variance();
     sheet.between("variance of a sample, try 2 over path tracer", ratio, [10.0, 1000.0]);
@@ -195,7 +198,7 @@ fn overview(c: &Context) -> Result<Outcome, Error> {
     let run = |estimator: &dyn Estimator| -> Result<Estimate, Error> {
         Ok(whole(&*c.scene("lit-box", &scenes::lit_box(8), Setup::square(8, spp))?, estimator, spp))
     };
-    let production = run(&Production { max_depth: None })?;
+    let production = run(&Production::default())?;
     sheet.agree("the witness after the slide", &run(&Walk::PATH)?, &production, 0.05);
     let simple = SimplePathIntegrator { max_depth: None, sample_lights: true, sample_bsdf: true };
     let scene = c.scene("lit-box", &scenes::lit_box(8), Setup::square(8, spp))?;
@@ -213,8 +216,7 @@ fn partition(c: &Context) -> Result<Outcome, Error> {
     let spp = c.spp(48);
     let side = c.side(96);
     let scene = c.scene("cornell-box", &scenes::cornell(), Setup::square(side, spp))?;
-    let parts =
-        take_apart(&scene, &Production { max_depth: None }, spp, 3, &|p: &Part| Some((p.bounces as usize).min(2)));
+    let parts = take_apart(&scene, &Production::default(), spp, 3, &|p: &Part| Some((p.bounces as usize).min(2)));
     let sum = parts[0].plus(1.0, &parts[1]).plus(1.0, &parts[2]);
     let off = (0..sum.mean.len()).map(|i| (sum.mean[i][1] - parts[3].mean[i][1]).abs() / parts[3].mean[i][1].max(1e-9));
     sheet.at_most("0 + 1 + more bounces against the picture, worst pixel (relative)", off.fold(0.0, f64::max), 2e-6);
@@ -255,7 +257,7 @@ fn pseudo_code(c: &Context) -> Result<Outcome, Error> {
     sheet.agree(
         "diffuse box: the slide's code and production",
         &whole(&scene, &literal, spp),
-        &whole(&other, &Production { max_depth: None }, spp),
+        &whole(&other, &Production::default(), spp),
         0.06,
     );
     let spp = c.spp(64);
@@ -263,7 +265,7 @@ fn pseudo_code(c: &Context) -> Result<Outcome, Error> {
     let run = |e: &dyn Estimator| -> Result<Estimate, Error> {
         Ok(whole(&*c.scene("lamp-in-a-mirror", &text, Setup { spp: Some(spp), ..Setup::default() })?, e, spp))
     };
-    let (slide, mended, production) = (run(&literal)?, run(&Walk::PATH)?, run(&Production { max_depth: None })?);
+    let (slide, mended, production) = (run(&literal)?, run(&Walk::PATH)?, run(&Production::default())?);
     sheet.agree("with the exception for specular surfaces, and production", &mended, &production, 0.1);
     let with_exception = mended.image();
     // The lamp in the mirror: as bright as F L there, and dark in the slide's picture.

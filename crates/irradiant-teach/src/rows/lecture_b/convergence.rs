@@ -147,11 +147,7 @@ fn kajiya(c: &Context) -> Result<Outcome, Error> {
     let setup = |spp| Setup { size: Some([32, 24]), spp: Some(spp), ..Setup::default() };
     let run = |sampler: &str, spp: u32| -> Result<Estimate, Error> {
         let text = scenes::GLASS_ON_GREEN.replace("independent", sampler);
-        Ok(whole(
-            &*c.scene(&format!("glass-on-green-{sampler}"), &text, setup(spp))?,
-            &Production { max_depth: Some(12) },
-            spp,
-        ))
+        Ok(whole(&*c.scene(&format!("glass-on-green-{sampler}"), &text, setup(spp))?, &Production::limited(12), spp))
     };
     // Pairs: the squared error of one is half of that of their difference. As many samples at each step, since caustics are
     // rare and bright.
@@ -211,7 +207,7 @@ fn unbiased(c: &Context) -> Result<Outcome, Error> {
         let text = at_the_origin(4, 0.4, &disk_light(1.0, 0.7, 5.0)).replace("independent", sampler);
         let mut mean = Mean::new();
         for _ in 0..c.spp(400).min(1000) {
-            let e = whole(&*c.scene("disk-lamp", &text, Setup::square(4, 1))?, &Production { max_depth: Some(1) }, 1);
+            let e = whole(&*c.scene("disk-lamp", &text, Setup::square(4, 1))?, &Production::limited(1), 1);
             // One number a render: pixels of one picture are not independent for every sampler.
             mean.add(e.grey());
         }
@@ -227,7 +223,7 @@ fn consistent(c: &Context) -> Result<Outcome, Error> {
     let mut points = vec![];
     for power in [4, 6, 8, 10, 12] {
         let spp = 1u32 << power;
-        let e = whole(&*c.scene("disk-lamp", &text, Setup::square(16, spp))?, &Production { max_depth: Some(1) }, spp);
+        let e = whole(&*c.scene("disk-lamp", &text, Setup::square(16, spp))?, &Production::limited(1), spp);
         let square: f64 = e.mean.iter().map(|p| (p[1] / expected - 1.0).powi(2)).sum();
         points.push((spp, (square / e.mean.len() as f64).sqrt(), e));
     }
@@ -254,11 +250,7 @@ fn low_discrepancy(c: &Context) -> Result<Outcome, Error> {
         let run = |sampler: &str| -> Result<Estimate, Error> {
             let setup = Setup { size: Some(size), spp: Some(spp), ..Setup::default() };
             let text = text.replace("\"independent\"", &format!("\"{sampler}\""));
-            Ok(whole(
-                &*c.scene(&format!("{name}-{sampler}"), &text, setup)?,
-                &Production { max_depth: Some(depth) },
-                spp,
-            ))
+            Ok(whole(&*c.scene(&format!("{name}-{sampler}"), &text, setup)?, &Production::limited(depth), spp))
         };
         let error = |sampler: &str| -> Result<f64, Error> {
             let mut sum = Mean::new();

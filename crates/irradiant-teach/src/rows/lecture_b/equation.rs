@@ -151,7 +151,14 @@ impl Box_ {
         bearer.ray = Ray::new(Point3::new(o[0], o[1], o[2]), Vec3::new(d[0], d[1], d[2]).normalize(), 0.0);
         let stream = self.scene.sampler.stream([pixel, 5], index);
         let (mut own, mut stats) = (self.lambda, Default::default());
-        let l = Production { max_depth }.sample(&self.scene, &bearer, &stream, &mut own, &mut stats, &mut |_| {});
+        let l = Production { max_depth, ..Production::default() }.sample(
+            &self.scene,
+            &bearer,
+            &stream,
+            &mut own,
+            &mut stats,
+            &mut |_| {},
+        );
         f64::from(l[1])
     }
 
@@ -328,7 +335,7 @@ fn radiance_probe(c: &Context) -> Result<Outcome, Error> {
         .ok_or_else(nothing)?;
     let rho = f64::from(bsdf.f(at.wo, at.wo, irradiant::core::bxdf::TransportMode::Radiance)[1]) * PI;
     let up = if at.wo.dot(bsdf.frame.z) > 0.0 { 1.0f32 } else { -1.0 };
-    let production = Production { max_depth: None };
+    let production = Production::default();
     let (side, per) = (64usize, c.spp(24));
     let mut index = 0;
     let mut integral = Mean::new();

@@ -199,7 +199,7 @@ fn probabilities(c: &Context) -> Result<Outcome, Error> {
         let sample = camera_sample(&scene, [(i % 8) as i32, (i / 8 % 8) as i32], i / 64);
         let Some(ray) = sample.camera_ray else { continue };
         let (mut lambda, mut stats, mut diary) = (sample.lambda, RenderStats::default(), Diary::default());
-        let integrator = PathIntegrator { max_depth: None, regularize: false };
+        let integrator = PathIntegrator::default();
         let all = integrator.radiance(&scene, &ray, &sample.stream, &mut lambda, &mut [], &mut stats, &mut diary);
         let told: f64 = diary.contributions.iter().map(|(_, c)| f64::from(c.radiance[1])).sum();
         sums = sums.max((told - f64::from(all[1])).abs() / f64::from(all[1]).max(1e-3));
@@ -288,11 +288,8 @@ fn one_path_per_length(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
     let spp = c.spp(512);
     let (alone, _) = per_length(c, 4, spp, false)?;
-    let production = whole(
-        &*c.scene("lit-box", &scenes::lit_box(8), Setup::square(8, spp))?,
-        &Production { max_depth: Some(4) },
-        spp,
-    );
+    let production =
+        whole(&*c.scene("lit-box", &scenes::lit_box(8), Setup::square(8, spp))?, &Production::limited(4), spp);
     sheet.agree("a path of its own for each length, and production", &sum(&alone), &production, 0.05);
     let (reused, _) = per_length(c, 4, spp, true)?;
     for k in 1..=4usize {
@@ -336,13 +333,10 @@ fn literal(c: &Context) -> Result<Outcome, Error> {
         (p.bounces > 0).then_some(0)
     })
     .swap_remove(0);
-    let production = take_apart(
-        &*c.scene("lit-box", &text, Setup::square(8, spp))?,
-        &Production { max_depth: None },
-        spp,
-        2,
-        &|p| Some((p.bounces > 0) as usize),
-    );
+    let production =
+        take_apart(&*c.scene("lit-box", &text, Setup::square(8, spp))?, &Production::default(), spp, 2, &|p| {
+            Some((p.bounces > 0) as usize)
+        });
     sheet.agree("the slide's code, and production's light of one and more bounces", &slide, &production[1], 0.06);
     sheet.at_least(
         "what it lacks where the eye sees the lamp: share of the picture",
@@ -462,7 +456,7 @@ fn throughputs(c: &Context) -> Result<Outcome, Error> {
             }
             None
         };
-        take_apart(&scene, &Production { max_depth: None }, spp, 0, &look);
+        take_apart(&scene, &Production::default(), spp, 0, &look);
         sheet.none_of(
             if spectral {
                 "with wavelengths: contributions not finite or negative"

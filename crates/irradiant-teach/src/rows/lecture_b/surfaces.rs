@@ -111,7 +111,7 @@ fn mesh_lights(c: &Context) -> Result<Outcome, Error> {
     let samples = run(&Walk { emission: Emission::AtTheEye, ..Walk::PATH }.depth(1), 2048)?;
     let rays = run(&Walk { roulette: Roulette::None, ..Walk::TRY_1 }.depth(1), 8192)?;
     sheet.agree("found by rays and by light samples", &rays, &samples, 0.12);
-    sheet.agree("production and light samples", &run(&Production { max_depth: Some(1) }, 2048)?, &samples, 0.12);
+    sheet.agree("production and light samples", &run(&Production::limited(1), 2048)?, &samples, 0.12);
     let lights = c.scene("mesh-lamp", &text, Setup::default())?.lights.len();
     sheet.between("lights of one mesh (its triangles, or pairs of them)", lights as f64, [32.0, 128.0]);
     Ok(sheet.finish())
@@ -155,7 +155,7 @@ fn four_ways(c: &Context) -> Result<Outcome, Error> {
     let mut diffuse = vec![];
     let estimators: [(&str, Box<dyn Estimator>); 2] = [
         ("the rule", Box::new(Walk::PATH.depth(2).wrong(c.wrong()))),
-        ("weighed (production)", Box::new(Production { max_depth: Some(2) })),
+        ("weighed (production)", Box::new(Production::limited(2))),
     ];
     for (how, estimator) in &estimators {
         for (name, text, expected) in &cases {
