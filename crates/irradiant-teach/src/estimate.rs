@@ -129,6 +129,13 @@ impl Estimate {
         })
     }
 
+    /// The picture's mean as its only pixel: for light that so few paths bring that its tiles do not know their noise.
+    pub fn as_one(&self) -> Self {
+        let total = self.total();
+        let (mean, variance) = (vec![total.map(|t| t.0)], vec![total.map(|t| t.1 * t.1)]);
+        Self { width: 1, spp: self.spp, mean, variance, stats: self.stats.clone() }
+    }
+
     /// Mean over picture and channels.
     pub fn grey(&self) -> f64 {
         self.total().iter().map(|t| t.0).sum::<f64>() / 3.0

@@ -57,10 +57,10 @@ fn path_bidirectional_and_light_tracing_agree_on_the_cornell_box() {
     for word in ["cropwindow", "\"box\"", "independent"] {
         assert!(scene.contains(word), "the built-in scene has changed: no {word}");
     }
-    let path = estimate(&scene, How::new(1024, 11));
+    let path = estimate(&scene, How::new(1536, 11));
     let both = estimate(&scene, How::new(512, 12).by(by(BDPT, &[])));
     assert_agree(&both, &path, 0.03, "Cornell box, bidirectional");
-    let traced = estimate(&scene, How::new(1024, 13).by(by(LIGHTTRACE, &[])));
+    let traced = estimate(&scene, How::new(1536, 13).by(by(LIGHTTRACE, &[])));
     assert_agree(&traced, &path, 0.03, "Cornell box, light tracing");
 }
 

@@ -199,7 +199,7 @@ fn caustics(c: &Context) -> Result<Outcome, Error> {
     sheet.at_least("caustics' share of the picture", share, 0.01);
     // The other way round: paths from the lamp.
     let from_the_lamp = caustic(&*c.scene("two-balls", scenes::TWO_BALLS, setup)?, c.spp(128));
-    sheet.agree("L S+ D E by paths from the eye and from the lamp", &parts[4], &from_the_lamp, 0.25);
+    sheet.agree("L S+ D E by paths from the eye and from the lamp", &parts[4].as_one(), &from_the_lamp.as_one(), 0.3);
     let side_by_side = strip(&[&parts[4].image(), &from_the_lamp.image()]);
     sheet.picture(
         "A03-caustics",
