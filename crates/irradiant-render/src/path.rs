@@ -36,7 +36,7 @@ pub struct PathIntegrator {
 /// When paths end by chance; the expected picture is the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Roulette {
-    /// When they carry little: [`survival_probability`].
+    /// When they carry little.
     #[default]
     Throughput,
     /// At each event with this chance, in (0, 1): for looking at light of many bounces, which ends early by throughput.
