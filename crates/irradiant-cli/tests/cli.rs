@@ -93,7 +93,11 @@ fn integrators_are_listed_with_their_options_and_named_in_the_header() {
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     for name in ["y.exr", "z.exr"] {
         let bytes = std::fs::read(folder.0.join(name)).expect("written");
-        assert!(String::from_utf8_lossy(&bytes).contains("path regularize=false roulette=throughput q=0.1 lightsampler=power"), "{name}");
+        assert!(
+            String::from_utf8_lossy(&bytes)
+                .contains("path regularize=false roulette=throughput q=0.1 lightsampler=power"),
+            "{name}"
+        );
     }
 }
 
