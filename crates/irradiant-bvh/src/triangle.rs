@@ -56,7 +56,7 @@ impl Shear {
 
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        // Written out for each order of axes, so that no index is checked or looked up: a fifth of the instructions.
+        // Written out for each order of axes, so that no index is looked up and no function is called.
         let (o, d) = (&ray.o, &ray.d);
         match Self::axes(ray) {
             axes @ [1, 2, 0] => Self::along(axes, [o[1], o[2], o[0]], [d[1], d[2], d[0]]),

@@ -43,7 +43,7 @@ pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample
 /// Camera rays that are traced together.
 ///
 /// Neighbours in the picture go the same way, so that their walks through the tree are one walk: in the Cornell box a camera ray
-/// then takes a third of the instructions.
+/// then takes 0.6 of the instructions.
 const TOGETHER: usize = 64;
 
 /// Samples are taken in squares of so many pixels a side: those of a few samples per pixel fill a batch with neighbours.

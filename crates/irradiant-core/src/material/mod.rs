@@ -420,7 +420,6 @@ impl Materials {
             Relief::Bump(height) => relief::bump(height, textures, at, tex),
             Relief::NormalMap(map) => self.normal_maps[map as usize].frame(at),
         };
-        // Built in place: a model is a quarter of a kilobyte, and copying it three times took 2 % of a path's instructions.
         let bsdf = Bsdf::new(frame, self.bxdf(&entry.material, textures, tex, lambda)?);
         if self.force_diffuse {
             return Some(forced_diffuse(&bsdf, at));
