@@ -30,13 +30,20 @@ pub struct CameraSample<'a> {
 /// Draws the camera's part of a sample.
 #[inline]
 pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample<'_> {
+    let draws = scene.sampler.stream(pixel, index).camera();
+    camera_sample_at(scene, pixel, index, draws.wavelength, draws.time)
+}
+
+/// As [`camera_sample`], at wavelengths and a time that other numbers in [0, 1) chose.
+#[inline]
+pub fn camera_sample_at(scene: &Scene, pixel: [i32; 2], index: u32, wavelength: f32, time: f32) -> CameraSample<'_> {
     let stream = scene.sampler.stream(pixel, index);
     let draws = stream.camera();
-    let lambda = scene.sample_wavelengths(draws.wavelength);
+    let lambda = scene.sample_wavelengths(wavelength);
     let filtered = scene.filter.sample(scene.film_draw(draws.film));
     let film = Point2::new(pixel[0] as f32 + 0.5 + filtered.offset[0], pixel[1] as f32 + 0.5 + filtered.offset[1]);
     let lens = if scene.camera.has_lens() { stream.lens() } else { Point2::new(0.5, 0.5) };
-    let camera_ray = scene.camera.generate_ray(film, lens, draws.time);
+    let camera_ray = scene.camera.generate_ray(film, lens, time);
     CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
 }
 

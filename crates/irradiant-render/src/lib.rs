@@ -27,6 +27,7 @@ pub mod registry;
 pub mod schedule;
 pub mod self_intersection;
 pub mod session;
+pub mod shared_path;
 pub mod simple_path;
 pub mod truncation;
 

@@ -14,8 +14,8 @@ use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
-use irradiant_core::interaction::{Interaction, ReferencePoint};
-use irradiant_core::light::{PixelLine, PixelRun, SampleMode};
+use irradiant_core::interaction::{Interaction, LightId, ReferencePoint};
+use irradiant_core::light::{LightSample, PixelLine, PixelRun, SampleMode};
 use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::sampler::{LightDraws, SampleStream};
 use irradiant_core::scene::Scene;
@@ -145,10 +145,43 @@ struct FirstHit {
 }
 
 /// Where the last scattering event was, for weighing a light that the next ray meets.
-struct Previous {
-    reference: ReferencePoint,
-    bsdf_pdf: f32,
-    specular: bool,
+pub(crate) struct Previous {
+    pub reference: ReferencePoint,
+    /// Over the number of light samples taken there.
+    pub bsdf_pdf: f32,
+    pub specular: bool,
+}
+
+/// A path on its way: the next ray, what it meets, and what the path carries there.
+pub(crate) struct Walk {
+    pub ray: Ray,
+    pub met: Option<Hit>,
+    pub throughput: SampledSpectrum,
+    /// Scattering events so far.
+    pub depth: u32,
+    /// Radiance is scaled by eta^2 at each refraction; roulette must not mistake that for brightness.
+    pub eta_scale: f32,
+    pub previous: Option<Previous>,
+    pub any_non_specular: bool,
+    /// What the ray sees of the sky if it meets nothing, where that has been looked up.
+    pub escape_place: Option<Point2>,
+}
+
+impl Walk {
+    /// As it leaves the camera.
+    #[inline]
+    pub fn from_camera(ray: Ray, met: Option<Hit>) -> Self {
+        Self {
+            ray,
+            met,
+            throughput: SampledSpectrum::ONE,
+            depth: 0,
+            eta_scale: 1.0,
+            previous: None,
+            any_non_specular: false,
+            escape_place: None,
+        }
+    }
 }
 
 impl PathIntegrator {
@@ -159,6 +192,12 @@ impl PathIntegrator {
             Ends::Constant => Roulette::Constant(options.number("q")),
         };
         Self { max_depth, regularize: options.flag("regularize"), roulette }
+    }
+
+    /// Whether a path ends at a surface after so many scattering events.
+    #[inline]
+    pub(crate) fn is_at_limit(&self, depth: u32) -> bool {
+        self.max_depth.is_some_and(|limit| depth >= limit)
     }
 
     /// What the camera ray sees, by one random path. Fills the layers of the film at the first surface.
@@ -189,29 +228,52 @@ impl PathIntegrator {
         stats: &mut RenderStats,
         recorder: &mut R,
     ) -> SampledSpectrum {
-        let mut ray = camera_ray.ray;
-        let mut met = first.hit;
         let mut radiance = SampledSpectrum::ZERO;
-        let mut throughput = SampledSpectrum::ONE;
-        let mut depth = 0;
-        // Radiance is scaled by eta^2 at each refraction; roulette must not mistake that for brightness.
-        let mut eta_scale = 1.0;
-        let mut previous: Option<Previous> = None;
-        let mut any_non_specular = false;
-        let mut escape_place = first.escape;
+        let mut walk = Walk { escape_place: first.escape, ..Walk::from_camera(camera_ray.ray, first.hit) };
         recorder.begin(lambda);
+        let why = self.follow(
+            &mut walk,
+            &mut radiance,
+            first.light,
+            scene,
+            camera_ray,
+            stream,
+            lambda,
+            layers,
+            stats,
+            recorder,
+        );
+        recorder.end(why);
+        radiance
+    }
 
-        let why = loop {
-            let Some(hit) = met else {
-                let previous = previous.as_ref();
-                radiance += self.escaped(scene, &ray, escape_place, &throughput, lambda, previous, depth, recorder);
-                break PathEnd::Escaped;
+    /// From what the path's ray meets to the path's end; `radiance` is what the path brings. `light` is the prepared light sample of a
+    /// first surface.
+    #[inline(always)]
+    pub(crate) fn follow<R: PathRecorder>(
+        &self,
+        walk: &mut Walk,
+        radiance: &mut SampledSpectrum,
+        light: Option<(LightDraws, PixelRun)>,
+        scene: &Scene,
+        camera_ray: &CameraRay,
+        stream: &SampleStream,
+        lambda: &mut Wavelengths,
+        layers: &mut [f32],
+        stats: &mut RenderStats,
+        recorder: &mut R,
+    ) -> PathEnd {
+        loop {
+            let depth = walk.depth;
+            let Some(hit) = walk.met else {
+                *radiance += self.escaped(scene, walk, lambda, recorder);
+                return PathEnd::Escaped;
             };
-            let at = scene.geometry.interaction(&ray, &hit);
+            let at = scene.geometry.interaction(&walk.ray, &hit);
 
             // Light that the ray meets by itself.
             if at.light.is_some() {
-                radiance += self.emitted(scene, &ray, &at, &throughput, lambda, previous.as_ref(), depth, recorder);
+                *radiance += self.emitted(scene, walk, &at, lambda, recorder);
             }
 
             let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
@@ -219,112 +281,129 @@ impl PathIntegrator {
             let mut scattering = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix);
             let Some(bsdf) = &mut scattering else {
                 // An interface: no surface, only a boundary. Weighing lights across it would need its light sampling too.
-                ray = at.spawn_ray(ray.d);
-                if let Some(p) = &mut previous {
+                walk.ray = at.spawn_ray(walk.ray.d);
+                if let Some(p) = &mut walk.previous {
                     p.specular = true;
                 }
                 stats.bounce_rays += 1;
-                met = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha());
+                walk.met = scene.geometry.intersect(&walk.ray, f32::INFINITY, &scene.alpha());
                 continue;
             };
             recorder.vertex(depth, &at, bsdf);
             if depth == 0 && !layers.is_empty() {
                 scene.layers.fill(layers, scene, camera_ray, &at, &footprint, bsdf, lambda);
             }
-            if self.max_depth.is_some_and(|limit| depth >= limit) {
-                break PathEnd::MaxDepth;
+            if self.is_at_limit(depth) {
+                return PathEnd::MaxDepth;
             }
-            if self.regularize && any_non_specular {
+            if self.regularize && walk.any_non_specular {
                 bsdf.regularize();
             }
 
             // Direct light: one sample of one light.
             if bsdf.flags().is_non_specular() {
-                let (draws, run) = match first.light {
+                let (draws, run) = match light {
                     Some((draws, run)) if depth == 0 => (draws, Some(run)),
                     _ => (stream.light(depth), None),
                 };
-                radiance += direct_light(scene, &at, bsdf, &throughput, lambda, &draws, run, depth, stats, recorder);
+                *radiance +=
+                    direct_light(scene, &at, bsdf, &walk.throughput, lambda, &draws, run, 1.0, depth, stats, recorder);
             }
 
-            // The next direction.
-            let draws = stream.scatter(depth);
-            let wo = at.wo;
-            let Some(sample) = bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
-                break PathEnd::Absorbed;
-            };
-            depth += 1;
-            stats.scatterings += 1;
-            stats.longest_path = stats.longest_path.max(depth);
-            throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
-            if throughput.is_black() {
-                break PathEnd::Absorbed;
+            let ended = self.scatter(scene, &at, bsdf, walk, stream, stats, recorder);
+            if let Some(why) = ended {
+                return why;
             }
-            let specular = sample.lobe.is_specular();
-            let bsdf_pdf = if sample.pdf_is_proportional && !specular {
-                bsdf.pdf(wo, sample.wi, TransportMode::Radiance, Sides::All)
-            } else {
-                sample.pdf
-            };
-            any_non_specular |= !specular;
-            if sample.lobe.is_transmissive() {
-                eta_scale *= sample.eta * sample.eta;
-            }
+        }
+    }
 
-            // Russian roulette: end paths that carry little.
-            let survival = match self.roulette {
-                Roulette::Throughput => survival_probability(&throughput, eta_scale, depth),
-                Roulette::Constant(q) => 1.0 - q,
-            };
-            recorder.scattering(&Scattering {
-                depth: depth - 1,
-                wi: sample.wi,
-                lobe: sample.lobe,
-                pdf: sample.pdf,
-                throughput,
-                survival,
-            });
-            if survival < 1.0 {
-                if draws.roulette >= survival {
-                    break PathEnd::Roulette;
-                }
-                throughput *= 1.0 / survival;
-            }
-            previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular });
-            ray = at.spawn_ray(sample.wi);
-            escape_place = scene.lights.place_of_escape(sample.wi);
-            stats.bounce_rays += 1;
-            met = scene.geometry.intersect(&ray, f32::INFINITY, &scene.alpha());
+    /// Draws a direction at a vertex, plays roulette, and traces the next ray. Why the path ended, if it did.
+    #[inline(always)]
+    pub(crate) fn scatter<R: PathRecorder>(
+        &self,
+        scene: &Scene,
+        at: &Interaction,
+        bsdf: &Bsdf,
+        walk: &mut Walk,
+        stream: &SampleStream,
+        stats: &mut RenderStats,
+        recorder: &mut R,
+    ) -> Option<PathEnd> {
+        let depth = walk.depth;
+
+        // The next direction.
+        let draws = stream.scatter(depth);
+        let wo = at.wo;
+        let Some(sample) = bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
+            return Some(PathEnd::Absorbed);
         };
-        recorder.end(why);
-        radiance
+        walk.depth += 1;
+        stats.scatterings += 1;
+        stats.longest_path = stats.longest_path.max(walk.depth);
+        walk.throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
+        if walk.throughput.is_black() {
+            return Some(PathEnd::Absorbed);
+        }
+        let specular = sample.lobe.is_specular();
+        let bsdf_pdf = if sample.pdf_is_proportional && !specular {
+            bsdf.pdf(wo, sample.wi, TransportMode::Radiance, Sides::All)
+        } else {
+            sample.pdf
+        };
+        walk.any_non_specular |= !specular;
+        if sample.lobe.is_transmissive() {
+            walk.eta_scale *= sample.eta * sample.eta;
+        }
+
+        // Russian roulette: end paths that carry little.
+        let survival = match self.roulette {
+            Roulette::Throughput => survival_probability(&walk.throughput, walk.eta_scale, walk.depth),
+            Roulette::Constant(q) => 1.0 - q,
+        };
+        recorder.scattering(&Scattering {
+            depth,
+            wi: sample.wi,
+            lobe: sample.lobe,
+            pdf: sample.pdf,
+            throughput: walk.throughput,
+            survival,
+        });
+        if survival < 1.0 {
+            if draws.roulette >= survival {
+                return Some(PathEnd::Roulette);
+            }
+            walk.throughput *= 1.0 / survival;
+        }
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular });
+        walk.ray = at.spawn_ray(sample.wi);
+        walk.escape_place = scene.lights.place_of_escape(sample.wi);
+        stats.bounce_rays += 1;
+        walk.met = scene.geometry.intersect(&walk.ray, f32::INFINITY, &scene.alpha());
+        None
     }
 
     /// Light from environments that an escaping ray sees, weighed against having sampled them.
-    fn escaped<R: PathRecorder>(
+    pub(crate) fn escaped<R: PathRecorder>(
         &self,
         scene: &Scene,
-        ray: &Ray,
-        place: Option<Point2>,
-        throughput: &SampledSpectrum,
+        walk: &Walk,
         lambda: &Wavelengths,
-        previous: Option<&Previous>,
-        depth: u32,
         recorder: &mut R,
     ) -> SampledSpectrum {
+        let (ray, depth, previous) = (&walk.ray, walk.depth, walk.previous.as_ref());
         recorder.escape(depth, ray.d);
         let mut sum = SampledSpectrum::ZERO;
         for &light in scene.lights.environments() {
             let from = previous.filter(|p| !p.specular).map(|p| &p.reference);
             let mode = SampleMode::Compensated;
-            let (emitted, pdf) = scene.lights.get(light).escaped_and_pdf(ray, place, from, lambda, mode);
+            let (emitted, pdf) = scene.lights.get(light).escaped_and_pdf(ray, walk.escape_place, from, lambda, mode);
             if emitted.is_black() {
                 continue;
             }
             let light_pdf = from.map_or(0.0, |from| scene.light_sampler.pmf(from, light) * pdf);
             let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
-            let radiance = *throughput * emitted * weight;
+            let radiance = walk.throughput * emitted * weight;
             sum += radiance;
             recorder.contribution(&Contribution {
                 bounces: depth,
@@ -341,17 +420,15 @@ impl PathIntegrator {
     }
 
     /// Light that the surface emits towards where the ray came from, weighed against having sampled it.
-    fn emitted<R: PathRecorder>(
+    pub(crate) fn emitted<R: PathRecorder>(
         &self,
         scene: &Scene,
-        ray: &Ray,
+        walk: &Walk,
         at: &Interaction,
-        throughput: &SampledSpectrum,
         lambda: &Wavelengths,
-        previous: Option<&Previous>,
-        depth: u32,
         recorder: &mut R,
     ) -> SampledSpectrum {
+        let (ray, depth, previous) = (&walk.ray, walk.depth, walk.previous.as_ref());
         let Some(light) = at.light else { return SampledSpectrum::ZERO };
         let emitted = scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
         if emitted.is_black() {
@@ -363,7 +440,7 @@ impl PathIntegrator {
         });
         let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
         let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
-        let radiance = *throughput * emitted * weight;
+        let radiance = walk.throughput * emitted * weight;
         recorder.contribution(&Contribution {
             bounces: depth,
             technique: Technique::Hit,
@@ -378,8 +455,40 @@ impl PathIntegrator {
     }
 }
 
-/// Light that arrives straight from one sampled point of one sampled light and is scattered along the path.
-fn direct_light<R: PathRecorder>(
+/// A sample of the light that arrives straight from lamps, unless something is in the way.
+pub(crate) struct LightPick {
+    pub light: LightId,
+    pub sample: LightSample,
+    /// Its radiance where it arrives, W m^-2 sr^-1 nm^-1, opacity included.
+    pub arriving: SampledSpectrum,
+    /// The density with which it was drawn, all lights together, 1/sr.
+    pub pdf: f32,
+}
+
+/// Picks a light and a point of it.
+#[inline(always)]
+pub(crate) fn pick_light(
+    scene: &Scene,
+    at: &Interaction,
+    lambda: &Wavelengths,
+    draws: &LightDraws,
+    prepared: Option<PixelRun>,
+) -> Option<LightPick> {
+    let reference = at.reference();
+    let PickedLight { id: light, pmf } = scene.light_sampler.sample(&reference, draws.pick)?;
+    let mode = SampleMode::Compensated;
+    let sample = match (scene.lights.sky(), prepared) {
+        (Some((id, sky)), Some(run)) if id == light => sky.arrive(run, lambda, mode),
+        _ => scene.lights.get(light).sample(&reference, draws.uv, lambda, mode),
+    }?;
+    let arriving = sample.radiance * scene.opacity(&sample);
+    Some(LightPick { light, arriving, pdf: pmf * sample.pdf, sample })
+}
+
+/// Light that arrives straight from one sampled point of one sampled light and is scattered along the path: one of `count` such samples
+/// of a vertex.
+#[inline(always)]
+pub(crate) fn direct_light<R: PathRecorder>(
     scene: &Scene,
     at: &Interaction,
     bsdf: &Bsdf,
@@ -387,25 +496,16 @@ fn direct_light<R: PathRecorder>(
     lambda: &Wavelengths,
     draws: &LightDraws,
     prepared: Option<PixelRun>,
+    count: f32,
     depth: u32,
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
-    let reference = at.reference();
-    let Some(PickedLight { id: light, pmf }) = scene.light_sampler.sample(&reference, draws.pick) else {
-        return SampledSpectrum::ZERO;
-    };
-    let mode = SampleMode::Compensated;
-    let sample = match (scene.lights.sky(), prepared) {
-        (Some((id, sky)), Some(run)) if id == light => sky.arrive(run, lambda, mode),
-        _ => scene.lights.get(light).sample(&reference, draws.uv, lambda, mode),
-    };
-    let Some(sample) = sample else {
+    let Some(LightPick { light, sample, arriving, pdf }) = pick_light(scene, at, lambda, draws, prepared) else {
         return SampledSpectrum::ZERO;
     };
     let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);
     let f = f * sample.wi.dot(bsdf.frame.z).abs();
-    let arriving = sample.radiance * scene.opacity(&sample);
     if f.is_black() || arriving.is_black() {
         return SampledSpectrum::ZERO;
     }
@@ -413,7 +513,7 @@ fn direct_light<R: PathRecorder>(
     if scene.is_occluded(at, &sample) {
         return SampledSpectrum::ZERO;
     }
-    let light_pdf = pmf * sample.pdf;
+    let light_pdf = pdf * count;
     // Weigh against the chance that the BSDF would have found this light; it never finds a delta.
     let weight = if sample.is_delta { 1.0 } else { power_heuristic(light_pdf, bsdf_pdf) };
     let radiance = *throughput * f * arriving * (weight / light_pdf);
@@ -457,7 +557,7 @@ const ROULETTE_BELOW: f32 = 0.5;
 /// Chance to go on: the largest throughput, freed of the eta^2 scaling, over [`ROULETTE_BELOW`]; 1 for the first two
 /// events.
 #[inline]
-fn survival_probability(throughput: &SampledSpectrum, eta_scale: f32, depth: u32) -> f32 {
+pub(crate) fn survival_probability(throughput: &SampledSpectrum, eta_scale: f32, depth: u32) -> f32 {
     if depth <= 1 {
         return 1.0;
     }

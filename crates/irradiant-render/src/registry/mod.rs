@@ -16,6 +16,7 @@ use crate::integrator::Integrator;
 /// What there is, in the order of lists: production first, then the lectures in the order of their slides.
 pub const INTEGRATORS: &[IntegratorEntry] = &[
     crate::path::ENTRY,
+    crate::shared_path::ENTRY,
     crate::bidirectional::ENTRY,
     crate::light_trace::ENTRY,
     crate::photon::ENTRY,

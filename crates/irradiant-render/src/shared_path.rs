@@ -1,0 +1,552 @@
+//! Path tracing whose paths are shared among neighbouring pixels.
+//!
+//! Bekaert, Sbert and Halton 2002, "Accelerating path tracing by re-using paths" (Eurographics Workshop on Rendering): the
+//! second surface of a path from one pixel, with all light that arrives there, also lights the first surfaces of its
+//! neighbours. Sixteen pixels of a block trace a path each; each of their second vertices is then connected to each of their
+//! first ones by a shadow ray, and a pixel has sixteen samples of indirect light for little more than the price of one.
+//!
+//! Path i, with its first vertex x_i, finds the second vertex y with the density p_i(y) = pdf_i cos_y / r_i^2 wherever it sees y. All of a
+//! block's paths are samples of one mixture by the balance heuristic (Veach and Guibas 1995): a pixel's estimate is the sum over the block's
+//! second vertices of f_i(y) V_i(y) L(y) / sum over k of p_k(y) V_k(y). It is unbiased, and bounded where the BSDF is: the pixel's own path is in
+//! the sum.
+//!
+//! What is shared: second vertices on diffuse surfaces, whose light does not depend on where it is seen from, for first vertices on diffuse
+//! surfaces. All else (direct light at the first vertex, lamps that the path meets, other materials) is each pixel's own, as in
+//! [`path`](crate::path).
+//!
+//! Errors of the pixels of a block go together: a picture has less noise per pixel but what is left is blotchy, and the mean over
+//! a block has the error that [`path`](crate::path) would give it. All of a block share wavelengths and time.
+
+use crate::camera_samples::{CameraSample, camera_sample_at};
+use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::path::{PathIntegrator, Previous, Walk, direct_light, pick_light, survival_probability};
+use crate::record::{Contribution, NoRecord, PathRecorder};
+use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
+use irradiant_core::bsdf::Bsdf;
+use irradiant_core::bxdf::{Bxdf, Sides, TransportMode};
+use irradiant_core::film::FilmTile;
+use irradiant_core::interaction::Interaction;
+use irradiant_core::scene::Scene;
+use irradiant_math::{Point3, Ray, Vec3};
+use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum, Wavelengths};
+
+/// Side of a block, pixels. Blocks are aligned to multiples of it, so that a pixel's companions do not depend on what is rendered.
+const SIDE: i32 = 4;
+/// Pixels of a block.
+const PIXELS: usize = (SIDE * SIDE) as usize;
+
+/// By name.
+pub const ENTRY: IntegratorEntry = IntegratorEntry {
+    name: "sharedpath",
+    promise: "path tracing whose indirect light is shared among the pixels of a block",
+    source: "Bekaert, Sbert and Halton 2002",
+    options: &[
+        OptionEntry {
+            name: "lights",
+            range: OptionRange::Count(1, 64),
+            default: Value::Count(1),
+            doc: "light samples at the first surface of each path",
+        },
+        LIGHT_SAMPLER,
+    ],
+    make: |options, max_depth| Box::new(SharedPathIntegrator { max_depth, light_samples: options.count("lights") }),
+};
+
+/// What can be set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharedPathIntegrator {
+    /// Scattering events at most; `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Light samples at the first surface, 1 or more.
+    pub light_samples: u32,
+}
+
+/// A surface that the camera sees.
+struct First {
+    at: Interaction,
+    bsdf: Bsdf,
+    /// What the path carries after it: f cos / pdf.
+    carried: SampledSpectrum,
+}
+
+/// A surface that a path meets next, with the light that it scatters (its own emission is not shared).
+struct Second {
+    at: Interaction,
+    light: Scattered,
+}
+
+/// Light that leaves a surface.
+enum Scattered {
+    /// The same radiance in all directions of the side of this normal.
+    Evenly { normal: Vec3, radiance: SampledSpectrum },
+    /// As its BSDF has it.
+    By { bsdf: Bsdf, incoming: Vec<Incoming> },
+}
+
+/// Light that arrives at a second vertex, by one sample of it.
+struct Incoming {
+    wi: Vec3,
+    /// Arriving radiance.
+    radiance: SampledSpectrum,
+    /// Density with which light samples find it, 1/sr; 0 where they cannot.
+    light_pdf: f32,
+    /// Whether drawing directions from the BSDF finds it.
+    found_by_bsdf: bool,
+}
+
+/// A path of the block.
+struct Member<'a> {
+    sample: CameraSample<'a>,
+    /// What is the pixel's own.
+    radiance: SampledSpectrum,
+    first: Option<First>,
+    second: Option<Second>,
+}
+
+/// A second vertex as a first vertex sees it.
+#[derive(Clone, Copy)]
+struct Pair {
+    giver: u8,
+    receiver: u8,
+    /// Density with which the receiver's BSDF finds the vertex, per area.
+    pdf: f32,
+    /// What the light there is multiplied with on its way to the camera.
+    f: SampledSpectrum,
+    /// From the second to the first.
+    wo: Vec3,
+}
+
+/// What blocks need not allocate anew.
+#[derive(Default)]
+struct Scratch {
+    layers: Vec<f32>,
+    rays: Vec<Ray>,
+    ends: Vec<f32>,
+    blocked: Vec<bool>,
+    pairs: Vec<Pair>,
+}
+
+impl Integrator for SharedPathIntegrator {
+    fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
+        let b = &unit.bounds;
+        let mut scratch = Scratch::default();
+        let channels = scene.layers.channels();
+        scratch.layers.resize(channels * PIXELS, 0.0);
+        for top in (b.y0.div_euclid(SIDE) * SIDE..b.y1).step_by(SIDE as usize) {
+            for left in (b.x0.div_euclid(SIDE) * SIDE..b.x1).step_by(SIDE as usize) {
+                for index in unit.samples.clone() {
+                    let members = self.block(scene, [left, top], index, &mut scratch, stats);
+                    for (i, member) in members.iter().enumerate() {
+                        let [x, y] = member.sample.pixel;
+                        if x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1 {
+                            continue;
+                        }
+                        let layers = &mut scratch.layers[i * channels..(i + 1) * channels];
+                        stats.paths += 1;
+                        let mut rgb = [0.0; 3];
+                        if let Some(camera_ray) = &member.sample.camera_ray {
+                            let (l, lambda) = (member.radiance * camera_ray.weight, &member.sample.lambda);
+                            let weight = member.sample.filter_weight;
+                            rgb = scene.film_rgb(l, lambda).map(|c| c * weight);
+                            scene.layers.add_buckets(l, lambda, layers);
+                            layers.iter_mut().for_each(|value| *value *= weight);
+                        }
+                        if !tile.add(x, y, rgb, layers) {
+                            stats.refuse(x, y, index);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn limits(&self) -> Vec<Limit> {
+        self.max_depth.map(Limit::MaxDepth).into_iter().collect()
+    }
+}
+
+impl SharedPathIntegrator {
+    /// The paths of one sample of a block's pixels, with all light that they bring to their pixels.
+    fn block<'a>(
+        &self,
+        scene: &'a Scene,
+        [left, top]: [i32; 2],
+        index: u32,
+        scratch: &mut Scratch,
+        stats: &mut RenderStats,
+    ) -> Vec<Member<'a>> {
+        let leader = scene.sampler.stream([left, top], index).camera();
+        let mut members: Vec<Member> = (0..PIXELS as i32)
+            .map(|i| {
+                let pixel = [left + i % SIDE, top + i / SIDE];
+                let sample = camera_sample_at(scene, pixel, index, leader.wavelength, leader.time);
+                Member { sample, radiance: SampledSpectrum::ZERO, first: None, second: None }
+            })
+            .collect();
+        scratch.layers.fill(0.0);
+        let nothing = || (Ray::new(Point3::ZERO, Vec3::Z, 0.0), 0.0);
+        let (rays, ends): (Vec<Ray>, Vec<f32>) =
+            members.iter().map(|m| m.sample.camera_ray.map_or_else(nothing, |c| (c.ray, f32::INFINITY))).unzip();
+        let mut hits = [None; PIXELS];
+        scene.geometry.intersect_batch(&rays, &ends, &scene.alpha(), &mut hits);
+
+        let channels = scene.layers.channels();
+        for (i, member) in members.iter_mut().enumerate() {
+            let Some(camera_ray) = member.sample.camera_ray else { continue };
+            stats.camera_rays += 1;
+            let layers = &mut scratch.layers[i * channels..(i + 1) * channels];
+            let mut lambda = member.sample.lambda;
+            let walk = Walk::from_camera(camera_ray.ray, hits[i]);
+            self.trace(scene, member, walk, &mut lambda, layers, stats);
+            if lambda != member.sample.lambda {
+                member.stand_for_all();
+            }
+        }
+        share(scene, &mut members, scratch, stats);
+        members
+    }
+
+    /// A path, and what is its pixel's own.
+    fn trace(
+        &self,
+        scene: &Scene,
+        member: &mut Member,
+        mut walk: Walk,
+        lambda: &mut Wavelengths,
+        layers: &mut [f32],
+        stats: &mut RenderStats,
+    ) {
+        let path = PathIntegrator { max_depth: self.max_depth, ..PathIntegrator::default() };
+        let Some(camera_ray) = member.sample.camera_ray else { return };
+        let stream = member.sample.stream;
+
+        // The first vertex.
+        let Some(hit) = walk.met else {
+            member.radiance += path.escaped(scene, &walk, lambda, &mut NoRecord);
+            return;
+        };
+        let at = scene.geometry.interaction(&walk.ray, &hit);
+        if at.light.is_some() {
+            member.radiance += path.emitted(scene, &walk, &at, lambda, &mut NoRecord);
+        }
+        let footprint = scene.texture_context(&at, Some(&camera_ray));
+        let mix = stream.mix(0);
+        let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+            return;
+        };
+        if !layers.is_empty() {
+            scene.layers.fill(layers, scene, &camera_ray, &at, &footprint, &bsdf, lambda);
+        }
+        if path.is_at_limit(0) {
+            return;
+        }
+        let count = self.light_samples;
+        if bsdf.flags().is_non_specular() {
+            for i in 0..count {
+                let draws = if count == 1 {
+                    stream.light(0)
+                } else {
+                    scene.sampler.stream(member.sample.pixel, member.sample.index * count + i).light(0)
+                };
+                let (one, n) = (SampledSpectrum::ONE, count as f32);
+                member.radiance +=
+                    direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, n, 0, stats, &mut NoRecord);
+            }
+        }
+        if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_some() {
+            return;
+        }
+        if let Some(previous) = &mut walk.previous {
+            previous.bsdf_pdf /= count as f32;
+        }
+        if is_shared(&bsdf) {
+            member.first = Some(First { at, bsdf, carried: walk.throughput });
+            self.second(&path, scene, member, walk, lambda, stats);
+        } else {
+            member.radiance += go_on(&path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
+        }
+    }
+
+    /// The second vertex of a path whose first can be shared.
+    fn second(
+        &self,
+        path: &PathIntegrator,
+        scene: &Scene,
+        member: &mut Member,
+        mut walk: Walk,
+        lambda: &mut Wavelengths,
+        stats: &mut RenderStats,
+    ) {
+        let stream = member.sample.stream;
+        let Some(hit) = walk.met else {
+            member.radiance += path.escaped(scene, &walk, lambda, &mut NoRecord);
+            return;
+        };
+        let at = scene.geometry.interaction(&walk.ray, &hit);
+        if at.light.is_some() {
+            member.radiance += path.emitted(scene, &walk, &at, lambda, &mut NoRecord);
+        }
+        let footprint = scene.texture_context(&at, None);
+        let mix = stream.mix(1);
+        let Some(bsdf) = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, lambda, mix) else {
+            return;
+        };
+        if path.is_at_limit(1) {
+            return;
+        }
+        if !is_shared(&bsdf) {
+            let mut radiance = SampledSpectrum::ZERO;
+            if bsdf.flags().is_non_specular() {
+                let draws = stream.light(1);
+                radiance += direct_light(
+                    scene,
+                    &at,
+                    &bsdf,
+                    &walk.throughput,
+                    lambda,
+                    &draws,
+                    None,
+                    1.0,
+                    1,
+                    stats,
+                    &mut NoRecord,
+                );
+            }
+            if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_none() {
+                radiance += go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
+            }
+            member.radiance += radiance;
+            return;
+        }
+        let light = match bsdf.bxdf {
+            Bxdf::Diffuse(_) => {
+                // From here on light counts as it leaves this surface; roulette goes by what arrives at the camera.
+                walk.eta_scale = walk.throughput.max_component();
+                walk.throughput = SampledSpectrum::ONE;
+                let draws = stream.light(1);
+                let one = SampledSpectrum::ONE;
+                let mut radiance =
+                    direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, 1.0, 1, stats, &mut NoRecord);
+                if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_none() {
+                    radiance += go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
+                }
+                let normal = bsdf.frame.z * 1f32.copysign(at.wo.dot(bsdf.frame.z));
+                Scattered::Evenly { normal, radiance }
+            }
+            _ => {
+                let incoming = self.incoming(path, scene, member, &at, &bsdf, walk, lambda, stats);
+                Scattered::By { bsdf, incoming }
+            }
+        };
+        member.second = Some(Second { at, light });
+    }
+
+    /// Light that arrives at a second vertex: by a light sample, and by a direction drawn from the BSDF.
+    fn incoming(
+        &self,
+        path: &PathIntegrator,
+        scene: &Scene,
+        member: &Member,
+        at: &Interaction,
+        bsdf: &Bsdf,
+        mut walk: Walk,
+        lambda: &mut Wavelengths,
+        stats: &mut RenderStats,
+    ) -> Vec<Incoming> {
+        let stream = &member.sample.stream;
+        let mut incoming = Vec::with_capacity(4);
+        if let Some(pick) = pick_light(scene, at, lambda, &stream.light(1), None)
+            && !pick.arriving.is_black()
+        {
+            stats.shadow_rays += 1;
+            if !scene.is_occluded(at, &pick.sample) {
+                incoming.push(Incoming {
+                    wi: pick.sample.wi,
+                    radiance: pick.arriving,
+                    light_pdf: pick.pdf,
+                    found_by_bsdf: !pick.sample.is_delta,
+                });
+            }
+        }
+        let draws = stream.scatter(1);
+        let Some(drawn) = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
+            return incoming;
+        };
+        walk.depth += 1;
+        stats.scatterings += 1;
+        stats.longest_path = stats.longest_path.max(walk.depth);
+        walk.throughput *= drawn.f * (bsdf.abs_cos(drawn.wi) / drawn.pdf);
+        let survival = survival_probability(&walk.throughput, walk.eta_scale, walk.depth);
+        if walk.throughput.is_black() || draws.roulette >= survival {
+            return incoming;
+        }
+        walk.eta_scale *= walk.throughput.max_component();
+        walk.throughput = SampledSpectrum::splat(1.0 / survival);
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 1.0, specular: false });
+        walk.ray = at.spawn_ray(drawn.wi);
+        walk.escape_place = scene.lights.place_of_escape(drawn.wi);
+        stats.bounce_rays += 1;
+        walk.met = scene.geometry.intersect(&walk.ray, f32::INFINITY, &scene.alpha());
+        // Lamps that light samples could have found; then all else.
+        let mut lamps = Lamps(drawn.wi, &mut incoming);
+        match walk.met {
+            None => _ = path.escaped(scene, &walk, lambda, &mut lamps),
+            Some(hit) => {
+                let met = scene.geometry.interaction(&walk.ray, &hit);
+                if met.light.is_some() {
+                    path.emitted(scene, &walk, &met, lambda, &mut lamps);
+                }
+            }
+        }
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 0.0, specular: false });
+        let radiance = go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
+        incoming.push(Incoming { wi: drawn.wi, radiance, light_pdf: 0.0, found_by_bsdf: true });
+        incoming
+    }
+}
+
+/// Catches what a ray sees of lamps that light samples find too, unweighted.
+struct Lamps<'a>(Vec3, &'a mut Vec<Incoming>);
+
+impl PathRecorder for Lamps<'_> {
+    fn contribution(&mut self, c: &Contribution) {
+        if c.light_pdf > 0.0 && c.mis_weight > 0.0 {
+            let radiance = c.radiance * (1.0 / c.mis_weight);
+            self.1.push(Incoming { wi: self.0, radiance, light_pdf: c.light_pdf, found_by_bsdf: true });
+        }
+    }
+}
+
+/// The rest of a path, by the ordinary rules.
+fn go_on<R: PathRecorder>(
+    path: &PathIntegrator,
+    scene: &Scene,
+    member: &Member,
+    walk: &mut Walk,
+    lambda: &mut Wavelengths,
+    stats: &mut RenderStats,
+    recorder: &mut R,
+) -> SampledSpectrum {
+    let Some(camera_ray) = &member.sample.camera_ray else { return SampledSpectrum::ZERO };
+    let mut radiance = SampledSpectrum::ZERO;
+    let stream = &member.sample.stream;
+    path.follow(walk, &mut radiance, None, scene, camera_ray, stream, lambda, &mut [], stats, recorder);
+    radiance
+}
+
+/// Whether a vertex of this kind can be shared: directions are drawn with the very density that is stated, and no lobe is a delta.
+fn is_shared(bsdf: &Bsdf) -> bool {
+    match bsdf.bxdf {
+        Bxdf::Diffuse(_) | Bxdf::Conductor(_) => !bsdf.flags().is_specular(),
+        _ => false,
+    }
+}
+
+impl Member<'_> {
+    /// One wavelength has come to stand for all four, at a dispersive surface: as the film takes it among four.
+    fn stand_for_all(&mut self) {
+        let among_four = |l: &mut SampledSpectrum| {
+            let one = l[0] * N_WAVELENGTHS as f32;
+            *l = SampledSpectrum::ZERO;
+            l[0] = one;
+        };
+        among_four(&mut self.radiance);
+        match &mut self.second {
+            Some(Second { light: Scattered::Evenly { radiance, .. }, .. }) => among_four(radiance),
+            Some(Second { light: Scattered::By { incoming, .. }, .. }) => {
+                incoming.iter_mut().for_each(|i| among_four(&mut i.radiance));
+            }
+            None => {}
+        }
+    }
+}
+
+/// Brings the light of all second vertices to all first ones.
+fn share(scene: &Scene, members: &mut [Member], scratch: &mut Scratch, stats: &mut RenderStats) {
+    let Scratch { rays, ends, blocked, pairs, .. } = scratch;
+    rays.clear();
+    pairs.clear();
+    for (j, giver) in members.iter().enumerate() {
+        let Some(second) = &giver.second else { continue };
+        for (i, receiver) in members.iter().enumerate() {
+            let Some(first) = &receiver.first else { continue };
+            let d = second.at.p - first.at.p;
+            let r2 = d.length_squared();
+            let wi = d * (1.0 / r2.sqrt());
+            if let Scattered::Evenly { normal, .. } = second.light
+                && !(wi.dot(normal) < 0.0)
+            {
+                continue;
+            }
+            let (f, pdf) = first.bsdf.f_and_pdf(first.at.wo, wi, TransportMode::Radiance);
+            // Per area instead of solid angle.
+            let there = wi.dot_normal(second.at.n).abs() / r2;
+            let pdf = pdf * there;
+            if !(pdf > 0.0) || !pdf.is_finite() {
+                continue;
+            }
+            let f = f * (first.bsdf.abs_cos(wi) * there);
+            pairs.push(Pair { giver: j as u8, receiver: i as u8, pdf, f, wo: -wi });
+            if i != j {
+                rays.push(first.at.spawn_ray_to(second.at.p, second.at.p_error, second.at.n));
+            }
+        }
+    }
+    ends.clear();
+    ends.resize(rays.len(), 1.0);
+    blocked.clear();
+    blocked.resize(rays.len(), false);
+    scene.geometry.occluded_batch(rays, ends, &scene.alpha(), blocked);
+    stats.shadow_rays += rays.len() as u64;
+    let mut answers = blocked.iter();
+    pairs.retain(|pair| pair.giver == pair.receiver || answers.next() != Some(&true));
+
+    let mut rest = &pairs[..];
+    for j in 0..members.len() {
+        let (of_one, others) = rest.split_at(rest.partition_point(|p| usize::from(p.giver) <= j));
+        rest = others;
+        let Some(second) = members[j].second.take() else { continue };
+        match &second.light {
+            Scattered::Evenly { radiance, .. } => {
+                if of_one.iter().all(|p| p.receiver != p.giver) {
+                    // Too near to grazing for numbers to see what the path saw.
+                    members[j].radiance +=
+                        members[j].first.as_ref().map_or(SampledSpectrum::ZERO, |f| f.carried) * *radiance;
+                    continue;
+                }
+                let total: f32 = of_one.iter().map(|p| p.pdf).sum();
+                for pair in of_one {
+                    members[usize::from(pair.receiver)].radiance += pair.f * *radiance * (1.0 / total);
+                }
+            }
+            Scattered::By { bsdf, incoming } => {
+                let alone = of_one.iter().all(|p| p.receiver != p.giver);
+                for light in incoming {
+                    let cos = bsdf.abs_cos(light.wi);
+                    let density = |pdf: f32| light.light_pdf + if light.found_by_bsdf { pdf } else { 0.0 };
+                    let radiance = light.radiance * cos;
+                    if alone {
+                        let (f, pdf) = bsdf.f_and_pdf(second.at.wo, light.wi, TransportMode::Radiance);
+                        let carried = members[j].first.as_ref().map_or(SampledSpectrum::ZERO, |f| f.carried);
+                        if pdf > 0.0 {
+                            members[j].radiance += carried * f * radiance * (1.0 / density(pdf));
+                        }
+                        continue;
+                    }
+                    let mut values = [(SampledSpectrum::ZERO, 0.0); PIXELS];
+                    let mut total = 0.0;
+                    for (pair, value) in of_one.iter().zip(&mut values) {
+                        *value = bsdf.f_and_pdf(pair.wo, light.wi, TransportMode::Radiance);
+                        total += pair.pdf * density(value.1);
+                    }
+                    if !(total > 0.0) {
+                        continue;
+                    }
+                    for (pair, (f, _)) in of_one.iter().zip(&values) {
+                        members[usize::from(pair.receiver)].radiance += pair.f * *f * radiance * (1.0 / total);
+                    }
+                }
+            }
+        }
+    }
+}
