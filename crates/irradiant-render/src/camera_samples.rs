@@ -5,7 +5,7 @@ use crate::integrator::{RenderStats, WorkUnit};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
-use irradiant_core::sampler::SampleStream;
+use irradiant_core::sampler::{CameraDraws, SampleStream};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point2, Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
@@ -30,20 +30,24 @@ pub struct CameraSample<'a> {
 /// Draws the camera's part of a sample.
 #[inline]
 pub fn camera_sample(scene: &Scene, pixel: [i32; 2], index: u32) -> CameraSample<'_> {
-    let draws = scene.sampler.stream(pixel, index).camera();
-    camera_sample_at(scene, pixel, index, draws.wavelength, draws.time)
+    let stream = scene.sampler.stream(pixel, index);
+    camera_sample_by(scene, pixel, index, stream, stream.camera())
 }
 
-/// As [`camera_sample`], at wavelengths and a time that other numbers in [0, 1) chose.
+/// As [`camera_sample`], by these numbers.
 #[inline]
-pub fn camera_sample_at(scene: &Scene, pixel: [i32; 2], index: u32, wavelength: f32, time: f32) -> CameraSample<'_> {
-    let stream = scene.sampler.stream(pixel, index);
-    let draws = stream.camera();
-    let lambda = scene.sample_wavelengths(wavelength);
+pub fn camera_sample_by<'a>(
+    scene: &'a Scene,
+    pixel: [i32; 2],
+    index: u32,
+    stream: SampleStream<'a>,
+    draws: CameraDraws,
+) -> CameraSample<'a> {
+    let lambda = scene.sample_wavelengths(draws.wavelength);
     let filtered = scene.filter.sample(scene.film_draw(draws.film));
     let film = Point2::new(pixel[0] as f32 + 0.5 + filtered.offset[0], pixel[1] as f32 + 0.5 + filtered.offset[1]);
     let lens = if scene.camera.has_lens() { stream.lens() } else { Point2::new(0.5, 0.5) };
-    let camera_ray = scene.camera.generate_ray(film, lens, time);
+    let camera_ray = scene.camera.generate_ray(film, lens, draws.time);
     CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
 }
 

@@ -17,7 +17,7 @@
 //! Errors of the pixels of a block go together: a picture has less noise per pixel but what is left is blotchy, and the mean over
 //! a block has the error that [`path`](crate::path) would give it. All of a block share wavelengths and time.
 
-use crate::camera_samples::{CameraSample, camera_sample_at};
+use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::path::{PathIntegrator, Previous, Walk, direct_light, pick_light, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
@@ -25,7 +25,8 @@ use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, 
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, Sides, TransportMode};
 use irradiant_core::film::FilmTile;
-use irradiant_core::interaction::Interaction;
+use irradiant_core::interaction::{Interaction, ReferencePoint};
+use irradiant_core::sampler::CameraDraws;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point3, Ray, Vec3};
 use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum, Wavelengths};
@@ -63,7 +64,8 @@ pub struct SharedPathIntegrator {
 
 /// A surface that the camera sees.
 struct First {
-    at: Interaction,
+    place: ReferencePoint,
+    wo: Vec3,
     bsdf: Bsdf,
     /// What the path carries after it: f cos / pdf.
     carried: SampledSpectrum,
@@ -71,7 +73,8 @@ struct First {
 
 /// A surface that a path meets next, with the light that it scatters (its own emission is not shared).
 struct Second {
-    at: Interaction,
+    place: ReferencePoint,
+    wo: Vec3,
     light: Scattered,
 }
 
@@ -118,8 +121,11 @@ struct Pair {
 
 /// What blocks need not allocate anew.
 #[derive(Default)]
-struct Scratch {
+struct Scratch<'a> {
+    members: Vec<Member<'a>>,
+    /// Of the film, for each member in turn.
     layers: Vec<f32>,
+    camera_rays: Vec<Ray>,
     rays: Vec<Ray>,
     ends: Vec<f32>,
     blocked: Vec<bool>,
@@ -135,8 +141,8 @@ impl Integrator for SharedPathIntegrator {
         for top in (b.y0.div_euclid(SIDE) * SIDE..b.y1).step_by(SIDE as usize) {
             for left in (b.x0.div_euclid(SIDE) * SIDE..b.x1).step_by(SIDE as usize) {
                 for index in unit.samples.clone() {
-                    let members = self.block(scene, [left, top], index, &mut scratch, stats);
-                    for (i, member) in members.iter().enumerate() {
+                    self.block(scene, [left, top], index, &mut scratch, stats);
+                    for (i, member) in scratch.members.iter().enumerate() {
                         let [x, y] = member.sample.pixel;
                         if x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1 {
                             continue;
@@ -160,6 +166,15 @@ impl Integrator for SharedPathIntegrator {
         }
     }
 
+    fn check(&self, scene: &Scene) -> Result<(), String> {
+        if scene.materials.may_pass() {
+            return Err(
+                "sharedpath cannot join surfaces through mixes that hold an interface; --integrator path can".into()
+            );
+        }
+        Ok(())
+    }
+
     fn limits(&self) -> Vec<Limit> {
         self.max_depth.map(Limit::MaxDepth).into_iter().collect()
     }
@@ -172,29 +187,37 @@ impl SharedPathIntegrator {
         scene: &'a Scene,
         [left, top]: [i32; 2],
         index: u32,
-        scratch: &mut Scratch,
+        scratch: &mut Scratch<'a>,
         stats: &mut RenderStats,
-    ) -> Vec<Member<'a>> {
+    ) {
+        let Scratch { members, layers, camera_rays, ends, .. } = scratch;
         let leader = scene.sampler.stream([left, top], index).camera();
-        let mut members: Vec<Member> = (0..PIXELS as i32)
-            .map(|i| {
-                let pixel = [left + i % SIDE, top + i / SIDE];
-                let sample = camera_sample_at(scene, pixel, index, leader.wavelength, leader.time);
-                Member { sample, radiance: SampledSpectrum::ZERO, first: None, second: None }
-            })
-            .collect();
-        scratch.layers.fill(0.0);
-        let nothing = || (Ray::new(Point3::ZERO, Vec3::Z, 0.0), 0.0);
-        let (rays, ends): (Vec<Ray>, Vec<f32>) =
-            members.iter().map(|m| m.sample.camera_ray.map_or_else(nothing, |c| (c.ray, f32::INFINITY))).unzip();
+        members.clear();
+        members.extend((0..PIXELS as i32).map(|i| {
+            let pixel = [left + i % SIDE, top + i / SIDE];
+            let stream = scene.sampler.stream(pixel, index);
+            let draws = CameraDraws { film: stream.camera().film, ..leader };
+            let sample = camera_sample_by(scene, pixel, index, stream, draws);
+            Member { sample, radiance: SampledSpectrum::ZERO, first: None, second: None }
+        }));
+        layers.fill(0.0);
+        // Where the camera sees nothing, a ray without length stands in.
+        camera_rays.clear();
+        ends.clear();
+        for member in members.iter() {
+            let nothing = || (Ray::new(Point3::ZERO, Vec3::Z, 0.0), 0.0);
+            let (ray, end) = member.sample.camera_ray.map_or_else(nothing, |c| (c.ray, f32::INFINITY));
+            camera_rays.push(ray);
+            ends.push(end);
+        }
         let mut hits = [None; PIXELS];
-        scene.geometry.intersect_batch(&rays, &ends, &scene.alpha(), &mut hits);
+        scene.geometry.intersect_batch(camera_rays, ends, &scene.alpha(), &mut hits);
 
         let channels = scene.layers.channels();
         for (i, member) in members.iter_mut().enumerate() {
             let Some(camera_ray) = member.sample.camera_ray else { continue };
             stats.camera_rays += 1;
-            let layers = &mut scratch.layers[i * channels..(i + 1) * channels];
+            let layers = &mut layers[i * channels..(i + 1) * channels];
             let mut lambda = member.sample.lambda;
             let walk = Walk::from_camera(camera_ray.ray, hits[i]);
             self.trace(scene, member, walk, &mut lambda, layers, stats);
@@ -202,8 +225,7 @@ impl SharedPathIntegrator {
                 member.stand_for_all();
             }
         }
-        share(scene, &mut members, scratch, stats);
-        members
+        share(scene, scratch, stats);
     }
 
     /// A path, and what is its pixel's own.
@@ -260,7 +282,7 @@ impl SharedPathIntegrator {
             previous.bsdf_pdf /= count as f32;
         }
         if is_shared(&bsdf) {
-            member.first = Some(First { at, bsdf, carried: walk.throughput });
+            member.first = Some(First { place: at.reference(), wo: at.wo, bsdf, carried: walk.throughput });
             self.second(&path, scene, member, walk, lambda, stats);
         } else {
             member.radiance += go_on(&path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
@@ -338,7 +360,7 @@ impl SharedPathIntegrator {
                 Scattered::By { bsdf, incoming }
             }
         };
-        member.second = Some(Second { at, light });
+        member.second = Some(Second { place: at.reference(), wo: at.wo, light });
     }
 
     /// Light that arrives at a second vertex: by a light sample, and by a direction drawn from the BSDF.
@@ -437,12 +459,17 @@ fn go_on<R: PathRecorder>(
 /// Whether a vertex of this kind can be shared: directions are drawn with the very density that is stated, and no lobe is a delta.
 fn is_shared(bsdf: &Bsdf) -> bool {
     match bsdf.bxdf {
-        Bxdf::Diffuse(_) | Bxdf::Conductor(_) => !bsdf.flags().is_specular(),
+        Bxdf::Diffuse(_) | Bxdf::DiffuseTransmission(_) | Bxdf::Conductor(_) => !bsdf.flags().is_specular(),
         _ => false,
     }
 }
 
 impl Member<'_> {
+    /// Shutter time of the block.
+    fn time(&self) -> f32 {
+        self.sample.camera_ray.map_or(0.0, |c| c.ray.time)
+    }
+
     /// One wavelength has come to stand for all four, at a dispersive surface: as the film takes it among four.
     fn stand_for_all(&mut self) {
         let among_four = |l: &mut SampledSpectrum| {
@@ -462,15 +489,15 @@ impl Member<'_> {
 }
 
 /// Brings the light of all second vertices to all first ones.
-fn share(scene: &Scene, members: &mut [Member], scratch: &mut Scratch, stats: &mut RenderStats) {
-    let Scratch { rays, ends, blocked, pairs, .. } = scratch;
+fn share(scene: &Scene, scratch: &mut Scratch, stats: &mut RenderStats) {
+    let Scratch { members, rays, ends, blocked, pairs, .. } = scratch;
     rays.clear();
     pairs.clear();
     for (j, giver) in members.iter().enumerate() {
         let Some(second) = &giver.second else { continue };
         for (i, receiver) in members.iter().enumerate() {
             let Some(first) = &receiver.first else { continue };
-            let d = second.at.p - first.at.p;
+            let d = second.place.p - first.place.p;
             let r2 = d.length_squared();
             let wi = d * (1.0 / r2.sqrt());
             if let Scattered::Evenly { normal, .. } = second.light
@@ -478,9 +505,9 @@ fn share(scene: &Scene, members: &mut [Member], scratch: &mut Scratch, stats: &m
             {
                 continue;
             }
-            let (f, pdf) = first.bsdf.f_and_pdf(first.at.wo, wi, TransportMode::Radiance);
+            let (f, pdf) = first.bsdf.f_and_pdf(first.wo, wi, TransportMode::Radiance);
             // Per area instead of solid angle.
-            let there = wi.dot_normal(second.at.n).abs() / r2;
+            let there = wi.dot_normal(second.place.n).abs() / r2;
             let pdf = pdf * there;
             if !(pdf > 0.0) || !pdf.is_finite() {
                 continue;
@@ -488,7 +515,8 @@ fn share(scene: &Scene, members: &mut [Member], scratch: &mut Scratch, stats: &m
             let f = f * (first.bsdf.abs_cos(wi) * there);
             pairs.push(Pair { giver: j as u8, receiver: i as u8, pdf, f, wo: -wi });
             if i != j {
-                rays.push(first.at.spawn_ray_to(second.at.p, second.at.p_error, second.at.n));
+                let Second { place: ReferencePoint { p, p_error, n, .. }, .. } = *second;
+                rays.push(first.place.spawn_ray_to(p, p_error, n, giver.time()));
             }
         }
     }
@@ -496,54 +524,55 @@ fn share(scene: &Scene, members: &mut [Member], scratch: &mut Scratch, stats: &m
     ends.resize(rays.len(), 1.0);
     blocked.clear();
     blocked.resize(rays.len(), false);
-    scene.geometry.occluded_batch(rays, ends, &scene.alpha(), blocked);
+    // Those to one second vertex travel together.
+    let mut first = 0;
+    for to_one in pairs.chunk_by(|a, b| a.giver == b.giver) {
+        let count = to_one.iter().filter(|p| p.giver != p.receiver).count();
+        let these = first..first + count;
+        scene.geometry.occluded_batch(&rays[these.clone()], &ends[these.clone()], &scene.alpha(), &mut blocked[these]);
+        first += count;
+    }
     stats.shadow_rays += rays.len() as u64;
     let mut answers = blocked.iter();
     pairs.retain(|pair| pair.giver == pair.receiver || answers.next() != Some(&true));
 
     let mut rest = &pairs[..];
     for j in 0..members.len() {
-        let (of_one, others) = rest.split_at(rest.partition_point(|p| usize::from(p.giver) <= j));
+        let (seen, others) = rest.split_at(rest.partition_point(|p| usize::from(p.giver) <= j));
         rest = others;
-        let Some(second) = members[j].second.take() else { continue };
-        match &second.light {
-            Scattered::Evenly { radiance, .. } => {
-                if of_one.iter().all(|p| p.receiver != p.giver) {
-                    // Too near to grazing for numbers to see what the path saw.
-                    members[j].radiance +=
-                        members[j].first.as_ref().map_or(SampledSpectrum::ZERO, |f| f.carried) * *radiance;
-                    continue;
-                }
-                let total: f32 = of_one.iter().map(|p| p.pdf).sum();
-                for pair in of_one {
+        let (Some(second), Some(first)) = (members[j].second.take(), &members[j].first) else { continue };
+        // Where numbers are too coarse to see again what the path saw, at grazing angles, it keeps what it found.
+        let own = [Pair { giver: j as u8, receiver: j as u8, pdf: 1.0, f: first.carried, wo: second.wo }];
+        let seen = if seen.iter().any(|p| p.receiver == p.giver) { seen } else { &own };
+        second.light.give(seen, members);
+    }
+}
+
+impl Scattered {
+    /// Gives each member that sees the vertex its share.
+    fn give(&self, seen: &[Pair], members: &mut [Member]) {
+        match self {
+            Self::Evenly { radiance, .. } => {
+                let total: f32 = seen.iter().map(|p| p.pdf).sum();
+                for pair in seen {
                     members[usize::from(pair.receiver)].radiance += pair.f * *radiance * (1.0 / total);
                 }
             }
-            Scattered::By { bsdf, incoming } => {
-                let alone = of_one.iter().all(|p| p.receiver != p.giver);
+            Self::By { bsdf, incoming } => {
                 for light in incoming {
-                    let cos = bsdf.abs_cos(light.wi);
-                    let density = |pdf: f32| light.light_pdf + if light.found_by_bsdf { pdf } else { 0.0 };
-                    let radiance = light.radiance * cos;
-                    if alone {
-                        let (f, pdf) = bsdf.f_and_pdf(second.at.wo, light.wi, TransportMode::Radiance);
-                        let carried = members[j].first.as_ref().map_or(SampledSpectrum::ZERO, |f| f.carried);
-                        if pdf > 0.0 {
-                            members[j].radiance += carried * f * radiance * (1.0 / density(pdf));
-                        }
-                        continue;
-                    }
-                    let mut values = [(SampledSpectrum::ZERO, 0.0); PIXELS];
+                    let mut f = [SampledSpectrum::ZERO; PIXELS];
                     let mut total = 0.0;
-                    for (pair, value) in of_one.iter().zip(&mut values) {
-                        *value = bsdf.f_and_pdf(pair.wo, light.wi, TransportMode::Radiance);
-                        total += pair.pdf * density(value.1);
+                    for (pair, f) in seen.iter().zip(&mut f) {
+                        let (value, pdf) = bsdf.f_and_pdf(pair.wo, light.wi, TransportMode::Radiance);
+                        *f = value;
+                        total += pair.pdf * (light.light_pdf + if light.found_by_bsdf { pdf } else { 0.0 });
                     }
                     if !(total > 0.0) {
                         continue;
                     }
-                    for (pair, (f, _)) in of_one.iter().zip(&values) {
-                        members[usize::from(pair.receiver)].radiance += pair.f * *f * radiance * (1.0 / total);
+                    let radiance = light.radiance * (bsdf.abs_cos(light.wi) / total);
+                    for (pair, f) in seen.iter().zip(&f) {
+                        members[usize::from(pair.receiver)].radiance += pair.f * *f * radiance;
                     }
                 }
             }
