@@ -1,0 +1,165 @@
+//! Paths that neighbouring pixels share bring the same light as paths of one's own, with less noise per pixel.
+//!
+//! Pixels of a block of 4 by 4 have errors in common, so the film's error bars of single pixels do not add up to those of a block: means
+//! of blocks are compared, whose errors are measured by the scatter of [`REPLICATES`] pictures. A block's mean may be off by 6 joint standard
+//! errors: with 63 degrees of freedom a right program is further off with odds of 1e-7, or 1e-5 over all blocks here.
+
+mod estimate;
+
+use estimate::{Estimate, How, INSIDE, cube, diffuse, estimate, film, lit_box, quad};
+use irradiant::{IntegratorChoice, RenderSettings, load_text, render};
+
+/// Pictures by shared paths, each of other random numbers.
+const REPLICATES: u64 = 64;
+/// Pixels of a block's side.
+const SIDE: usize = 4;
+
+fn choice(words: &str) -> IntegratorChoice {
+    let mut words = words.split_whitespace();
+    let named = IntegratorChoice::named(words.next().unwrap_or_default());
+    words.fold(named, |choice, pair| choice?.with_words(pair)).unwrap_or_else(|why| panic!("{why}"))
+}
+
+/// Of each block the mean, by channel.
+fn blocks(picture: &Estimate) -> Vec<[f64; 3]> {
+    let per_row = picture.width / SIDE;
+    let mut means = vec![[0.0; 3]; picture.mean.len() / (SIDE * SIDE)];
+    for (i, pixel) in picture.mean.iter().enumerate() {
+        let block = i / picture.width / SIDE * per_row + i % picture.width / SIDE;
+        (0..3).for_each(|c| means[block][c] += pixel[c] / (SIDE * SIDE) as f64);
+    }
+    means
+}
+
+/// Means of blocks over replicates and the squares of their standard errors, by channel.
+fn replicated(scene: &str, how: &How) -> Vec<[(f64, f64); 3]> {
+    let pictures: Vec<Vec<[f64; 3]>> = (0..REPLICATES)
+        .map(|i| blocks(&estimate(scene, How { seed: how.seed + 1000 * (i + 1), ..how.clone() })))
+        .collect();
+    let n = REPLICATES as f64;
+    (0..pictures[0].len())
+        .map(|block| {
+            std::array::from_fn(|c| {
+                let mean = pictures.iter().map(|p| p[block][c]).sum::<f64>() / n;
+                let square = pictures.iter().map(|p| (p[block][c] - mean).powi(2)).sum::<f64>();
+                (mean, square / (n - 1.0) / n)
+            })
+        })
+        .collect()
+}
+
+/// Compares shared paths, `spp` samples in each replicate, with as many paths of their own; a bias of `power` of the whole must be visible.
+#[track_caller]
+fn assert_shared_is_right(scene: &str, words: &str, how: How, power: f64) {
+    let shared = replicated(scene, &how.clone().by(choice(words)));
+    let own = replicated(scene, &How { seed: how.seed + 500, ..how });
+    for c in 0..3 {
+        let sum = |blocks: &[[(f64, f64); 3]]| {
+            blocks.iter().fold((0.0, 0.0), |(mean, variance), b| (mean + b[c].0, variance + b[c].1))
+        };
+        let ((a, va), (b, vb)) = (sum(&shared), sum(&own));
+        let (z, visible) = ((a - b) / (va + vb).sqrt(), 6.9 * (va + vb).sqrt() / b);
+        eprintln!("{words}: channel {c}: z {z:.2}; would see a bias of {:.2} %", 100.0 * visible);
+        assert!(visible <= power, "only a bias of {:.2} % would be seen", 100.0 * visible);
+        assert!(z.abs() < 4.9, "channel {c}: {a} by shared paths, {b} by others: z {z:.2}");
+        for (i, (s, o)) in shared.iter().zip(&own).enumerate() {
+            let z = (s[c].0 - o[c].0) / (s[c].1 + o[c].1).sqrt().max(1e-9);
+            assert!(z.abs() < 6.0, "block {i} channel {c}: {} by shared paths, {} by others: z {z:.2}", s[c].0, o[c].0);
+        }
+    }
+}
+
+/// The box of other tests, in 4 by 4 blocks.
+fn diffuse_box() -> String {
+    lit_box().replace("resolution\" 8", "resolution\" 16")
+}
+
+/// Metals, glass, a leaf, a coat and diffuse things in a box under a sky, a lamp and a point light; something moves.
+fn all_sorts() -> String {
+    let walls = [[0.7, 0.3, 0.2], [0.2, 0.6, 0.3], [0.7, 0.7, 0.7], [0.5, 0.5, 0.6], [0.6, 0.6, 0.6], [0.4, 0.4, 0.5]];
+    let open = cube(walls);
+    // Without the ceiling, which is the fourth wall.
+    let parts: Vec<&str> = open.split("Material").collect();
+    let open: String =
+        parts.iter().enumerate().filter(|(i, _)| *i != 0 && *i != 4).map(|(_, p)| format!("Material{p}")).collect();
+    film(16)
+        + INSIDE
+        + "WorldBegin\nLightSource \"infinite\" \"rgb L\" [ .5 .6 .8 ]\nLightSource \"point\" \"rgb I\" [ .3 .3 .2 ] \"point3 from\" [ -0.7 0.8 -0.6 ]\n"
+        + &open
+        + "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 3 2 4 ] \"bool twosided\" true\n"
+        + &quad([[-0.6, 0.7, 0.5], [0.1, 0.7, 0.5], [0.1, 0.6, 0.8], [-0.6, 0.6, 0.8]])
+        + "AttributeEnd\nAttributeBegin\nMaterial \"conductor\" \"float roughness\" 0.3\nTranslate 0.4 -0.6 0.3\nShape \"sphere\" \"float radius\" 0.4\nAttributeEnd\n"
+        + "AttributeBegin\nMaterial \"conductor\" \"float roughness\" 0.15 \"rgb reflectance\" [ .9 .6 .4 ]\nTranslate 0 -0.99 0\nRotate 90 1 0 0\nShape \"disk\" \"float radius\" 0.8\nAttributeEnd\n"
+        + "AttributeBegin\nMaterial \"diffusetransmission\" \"rgb reflectance\" [ .3 .2 .1 ] \"rgb transmittance\" [ .2 .5 .2 ]\nTranslate -0.6 -0.2 0.5\nRotate 20 0 1 0\nShape \"disk\" \"float radius\" 0.4\nAttributeEnd\n"
+        + "AttributeBegin\nMaterial \"dielectric\"\nTranslate -0.3 -0.7 -0.1\nShape \"sphere\" \"float radius\" 0.2\nAttributeEnd\n"
+        + "AttributeBegin\nMaterial \"coateddiffuse\"\nTranslate 0.6 0.2 0.6\nShape \"sphere\" \"float radius\" 0.2\nAttributeEnd\n"
+        + "AttributeBegin\n"
+        + &diffuse(0.4, 0.5, 0.8)
+        + "ActiveTransform EndTime\nTranslate 0.3 0 0\nActiveTransform All\nTranslate -0.2 0.3 0.4\nShape \"sphere\" \"float radius\" 0.15\nAttributeEnd\n"
+}
+
+#[test]
+fn the_diffuse_box_at_every_depth() {
+    let scene = diffuse_box();
+    for (depth, power) in [(1, 0.01), (2, 0.01), (3, 0.01)] {
+        assert_shared_is_right(&scene, "sharedpath", How::new(32, u64::from(depth)).depth(depth), power);
+    }
+    assert_shared_is_right(&scene, "sharedpath lights=3", How::new(32, 4), 0.015);
+}
+
+#[test]
+fn all_sorts_of_surfaces_and_lights() {
+    let scene = all_sorts();
+    assert_shared_is_right(&scene, "sharedpath", How::new(48, 11), 0.03);
+    assert_shared_is_right(&scene, "sharedpath lights=2", How::new(32, 12).depth(3).spectral(), 0.06);
+}
+
+#[test]
+fn wavelengths_that_part_behind_a_second_vertex() {
+    // A dispersive ball that walls and metal see, so that paths lose three of their wavelengths after what they share.
+    let walls = [[0.7, 0.3, 0.2], [0.2, 0.6, 0.3], [0.7, 0.7, 0.7], [0.5, 0.5, 0.6], [0.6, 0.6, 0.6], [0.7, 0.7, 0.7]];
+    let scene = film(16)
+        + INSIDE
+        + "WorldBegin\n"
+        + &cube(walls)
+        + "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 3 2 4 ] \"bool twosided\" true\n"
+        + &quad([[-0.6, 0.7, -0.5], [0.6, 0.7, -0.5], [0.6, 0.6, 0.6], [-0.6, 0.6, 0.6]])
+        + "AttributeEnd\nAttributeBegin\nMaterial \"dielectric\" \"spectrum eta\" \"glass-F11\"\nTranslate 0.3 -0.5 0.3\nShape \"sphere\" \"float radius\" 0.45\nAttributeEnd\n"
+        + "AttributeBegin\nMaterial \"conductor\" \"float roughness\" 0.3\nTranslate -0.5 -0.6 0.3\nShape \"sphere\" \"float radius\" 0.35\nAttributeEnd\n";
+    assert_shared_is_right(&scene, "sharedpath", How::new(64, 21).depth(6).spectral(), 0.05);
+}
+
+#[test]
+fn a_pixel_is_the_same_in_any_crop_and_has_less_noise() {
+    let file = load_text("test", &diffuse_box(), ".").expect("a scene");
+    let settings = How::new(16, 5).by(choice("sharedpath")).depth(5).settings();
+    let whole = render(&file, &settings).expect("a picture");
+    let part = Some([3.0, 10.0, 5.0, 14.0].map(|x| x / 16.0));
+    let crop = render(&file, &RenderSettings { crop: part, ..settings }).expect("a picture");
+    let bounds = crop.film.bounds();
+    assert_eq!((bounds.x0, bounds.x1, bounds.y0, bounds.y1), (3, 10, 5, 14));
+    for y in bounds.y0..bounds.y1 {
+        for x in bounds.x0..bounds.x1 {
+            assert_eq!(whole.film.pixel(x, y).mean(), crop.film.pixel(x, y).mean(), "pixel {x}, {y}");
+        }
+    }
+    // All light is indirect where the lamp shines at the ceiling.
+    let indirect =
+        diffuse_box().replace("\"bool twosided\" true", "").replace("AreaLight", "ReverseOrientation\nAreaLight");
+    let noise = |words: &str| {
+        let picture = estimate(&indirect, How::new(64, 6).by(choice(words)));
+        picture.variance.iter().flatten().sum::<f64>()
+    };
+    let (shared, own) = (noise("sharedpath"), noise("path"));
+    assert!(shared < 0.5 * own, "variance {shared} by shared paths, {own} by others");
+}
+
+#[test]
+fn mixes_that_hold_an_interface_are_refused() {
+    let scene = film(4)
+        + INSIDE
+        + "WorldBegin\nMaterial \"diffuse\"\nMakeNamedMaterial \"a\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"b\" \"string type\" \"interface\"\nMaterial \"mix\" \"string materials\" [ \"a\" \"b\" ] \"float amount\" 0.5\nShape \"sphere\"\nLightSource \"infinite\"\n";
+    let file = load_text("test", &scene, ".").expect("a scene");
+    let why = render(&file, &How::new(1, 1).by(choice("sharedpath")).settings()).err().expect("refused").to_string();
+    assert!(why.contains("--integrator path"), "{why}");
+}
