@@ -92,8 +92,13 @@ pub type Contestants = Vec<(String, Box<dyn Contestant>)>;
 pub fn all(setting: &Setting, folder: &Path) -> (Contestants, Vec<String>) {
     let mut contestants: Contestants = Vec::new();
     let mut missing = Vec::new();
-    for color in ["rgb", "spectral"] {
-        contestants.push((format!("Irradiant {color}"), Box::new(irradiant(setting, folder, &["--color", color]))));
+    let ours: [(&str, &[&str]); 3] = [
+        ("rgb", &["--color", "rgb"]),
+        ("shared", &["--color", "rgb", "--integrator", "sharedpath"]),
+        ("spectral", &["--color", "spectral"]),
+    ];
+    for (name, options) in ours {
+        contestants.push((format!("Irradiant {name}"), Box::new(irradiant(setting, folder, options))));
     }
     let Some(peers) = &setting.peers else {
         return (contestants, vec!["all peers: no --peers folder".into()]);

@@ -80,6 +80,9 @@ impl Mask {
     }
 }
 
+/// Side of the blocks of [`Truth::relative_error_of_blocks`], pixels.
+pub const BLOCK: usize = 8;
+
 /// The truth, estimated twice, so that the noise of the reference does not count as error of the picture.
 pub struct Truth {
     first: Picture,
@@ -120,6 +123,31 @@ impl Truth {
             let x = f64::from(picture.rgb[i]);
             (x - f64::from(self.first.rgb[i])) * (x - f64::from(self.second.rgb[i]))
         })
+    }
+
+    /// As [`Truth::relative_error`], of means over blocks of [`BLOCK`] by [`BLOCK`] pixels that all count: what is left of the error where one
+    /// looks at more than single pixels.
+    pub fn relative_error_of_blocks(&self, picture: &Picture) -> f64 {
+        let (mut sum, mut blocks) = (0.0, 0);
+        let (width, height) = (picture.width, picture.height);
+        for top in (0..height / BLOCK).map(|y| y * BLOCK) {
+            for left in (0..width / BLOCK).map(|x| x * BLOCK) {
+                let pixels = || (0..BLOCK * BLOCK).map(|i| (top + i / BLOCK) * width + left + i % BLOCK);
+                if !pixels().all(|pixel| self.mask.counts(pixel)) {
+                    continue;
+                }
+                blocks += 1;
+                for c in 0..3 {
+                    let of = |p: &Picture| {
+                        pixels().map(|pixel| f64::from(p.rgb[3 * pixel + c])).sum::<f64>() / (BLOCK * BLOCK) as f64
+                    };
+                    let x = of(picture);
+                    let square = (x - of(&self.first)) * (x - of(&self.second));
+                    sum += square / (of(&self.mean).powi(2) + self.epsilon);
+                }
+            }
+        }
+        sum / f64::from(3 * blocks)
     }
 
     /// What [`Truth::relative_error`] would be of unbiased pictures that scatter as these do: it needs no reference.
@@ -177,6 +205,16 @@ mod tests {
         // A picture that is 10 % too bright and has no noise: 0.04 / 4.04.
         let truth = Truth::new(noisy(2.0, 0.1, 1), noisy(2.0, 0.1, 2), Mask::without_lamps(&dark())).unwrap();
         let found = truth.relative_error(&noisy(2.2, 0.0, 0));
+        assert!((found / (0.04 / 4.04) - 1.0).abs() < 0.02, "{found}");
+    }
+
+    #[test]
+    fn noise_of_single_pixels_is_gone_from_blocks_and_bias_is_not() {
+        let truth = Truth::new(noisy(2.0, 0.5, 1), noisy(2.0, 0.5, 2), Mask::without_lamps(&dark())).unwrap();
+        let expected = 1.0 / 12.0 / 4.04 / (BLOCK * BLOCK) as f64;
+        let found = truth.relative_error_of_blocks(&noisy(2.0, 1.0, 3));
+        assert!((found / expected - 1.0).abs() < 0.3, "{found} {expected}");
+        let found = truth.relative_error_of_blocks(&noisy(2.2, 0.0, 0));
         assert!((found / (0.04 / 4.04) - 1.0).abs() < 0.02, "{found}");
     }
 

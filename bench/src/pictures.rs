@@ -33,6 +33,9 @@ pub struct Entry {
     pub spp: u32,
     /// relMSE of each picture.
     pub errors: Vec<f64>,
+    /// relMSE of means over blocks of pixels, of each picture.
+    #[serde(default)]
+    pub block_errors: Vec<f64>,
     /// CPU seconds of each picture.
     pub cpu_seconds: Vec<f64>,
     /// Seconds of each picture.
@@ -64,6 +67,11 @@ impl Entry {
     /// Mean CPU seconds of a picture.
     pub fn cost(&self) -> f64 {
         mean(&self.cpu_seconds)
+    }
+
+    /// Error of block means times CPU seconds; NaN where it was not measured.
+    pub fn block_product(&self) -> f64 {
+        mean(&self.block_errors) * self.cost()
     }
 
     /// Error times CPU seconds: the measure.
@@ -215,6 +223,7 @@ pub fn run(scene: &Scene, amount: &Amount, setting: &Setting) -> Result<Report, 
             cpu_seconds: costs.iter().map(|(c, _)| c.cpu_seconds).collect(),
             seconds: costs.iter().map(|(c, _)| c.seconds).collect(),
             loads: costs.iter().map(|(_, l)| *l).collect(),
+            block_errors: pictures.iter().map(|p| truth.relative_error_of_blocks(p)).collect(),
             scatter: truth.scatter(pictures),
             mean_ratio: std::array::from_fn(|c| found[c] / expected[c]),
             first_extra_seconds: costs.iter().find_map(|(c, _)| c.first_extra_seconds),
