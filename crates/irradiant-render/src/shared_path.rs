@@ -281,7 +281,7 @@ impl SharedPathIntegrator {
         if let Some(previous) = &mut walk.previous {
             previous.bsdf_pdf /= count as f32;
         }
-        if is_shared(&bsdf) {
+        if gains(&bsdf) {
             member.first = Some(First { place: at.reference(), wo: at.wo, bsdf, carried: walk.throughput });
             self.second(&path, scene, member, walk, lambda, stats);
         } else {
@@ -462,6 +462,15 @@ fn is_shared(bsdf: &Bsdf) -> bool {
         Bxdf::Diffuse(_) | Bxdf::DiffuseTransmission(_) | Bxdf::Conductor(_) => !bsdf.flags().is_specular(),
         _ => false,
     }
+}
+
+/// First vertices on metals with facets of a smaller alpha do not take part: what lights one pixel's mirror image is of no use to its
+/// neighbour's.
+const LEAST_ALPHA: f32 = 0.04;
+
+/// Whether a first vertex of this kind gains from what its neighbours' paths find.
+fn gains(bsdf: &Bsdf) -> bool {
+    is_shared(bsdf) && !matches!(&bsdf.bxdf, Bxdf::Conductor(metal) if metal.alpha() < LEAST_ALPHA)
 }
 
 impl Member<'_> {

@@ -77,6 +77,13 @@ impl Conductor {
         if self.facets.is_smooth() { Lobe::SPECULAR_REFLECTION } else { Lobe::GLOSSY_REFLECTION }
     }
 
+    /// How rough it is: the smaller of its facets' alphas.
+    #[inline]
+    pub fn alpha(&self) -> f32 {
+        let [x, y] = self.facets.alphas();
+        x.min(y)
+    }
+
     #[inline]
     pub(super) fn f_and_pdf(&self, wo: Vec3, wi: Vec3) -> (SampledSpectrum, f32) {
         mirror_f_and_pdf(&self.facets, wo, wi, |cos| self.fresnel(cos))
