@@ -413,20 +413,18 @@ fn what_a_depth_limit_leaves_out_is_estimated() {
         ..unlimited()
     };
     let whole = picture(&scene, settings(MaxDepth::None));
-    assert_eq!(whole.truncation(), None);
     let file = load_text("test", &scene, ".").unwrap();
     assert_eq!(irradiant::Job::new(&file, &settings(MaxDepth::None)).unwrap().missing_light(), None);
     for depth in [3, 5] {
         let limited = picture(&scene, settings(MaxDepth::Limit(depth)));
-        let said = limited.truncation().expect("the terms reach the limit");
         let truth = mean(&whole, "picture")[1] / mean(&limited, "picture")[1] - 1.0;
-        assert!((said.missing / truth - 1.0).abs() < 0.25, "depth {depth}: {said:?}, truth {truth}");
-        // And from a few paths without limit, with an error bar.
+        // From a few paths without limit, with an error bar.
         let file = load_text("test", &scene, ".").unwrap();
         let job = irradiant::Job::new(&file, &settings(MaxDepth::Limit(depth))).unwrap();
         let missing = job.missing_light().expect("there is a limit");
         assert!((missing.share - truth).abs() < 5.0 * missing.standard_error + 0.02 * truth, "{missing:?} {truth}");
         assert!(missing.standard_error < 0.2 * truth, "depth {depth}: {missing:?} says nothing");
+        assert!(missing.found > 100 && missing.paths >= missing.found, "{missing:?}");
     }
 }
 
@@ -444,6 +442,10 @@ fn impossible_layers_are_refused_with_what_to_try() {
     assert!(refuse(&["a=LD'flor'E"], plain()).contains("did you mean 'floor'?"));
     let huge = refuse(&["bounces:60", "partial:60"], RenderSettings { resolution: Some([4096, 2048]), ..plain() });
     assert!(huge.contains("fewer layers") && huge.contains("GiB"), "{huge}");
+    assert!(huge.contains("--max-film-memory"), "{huge}");
+    // A limit that the user sets counts.
+    let small = refuse(&["bounces:58"], RenderSettings { max_film_bytes: Some(300_000), ..plain() });
+    assert!(small.contains("fewer layers"), "{small}");
     let walk = irradiant::IntegratorChoice::named("randomwalk").unwrap();
     assert!(refuse(&["gi"], RenderSettings { integrator: Some(walk), ..plain() }).contains("--integrator path"));
     for (text, help) in [
