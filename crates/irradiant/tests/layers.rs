@@ -485,9 +485,13 @@ fn contact_sheets_hold_every_tile() {
     rendering.save_contact_sheet(&path, 1.0).unwrap();
     let sheet = irradiant::image::read_file(&path, &irradiant::image::ReadOptions::default()).unwrap();
     let _ = std::fs::remove_dir_all(&folder);
-    // 9 tiles of 20 x 20 with 19 lines of label: columns times rows of them, and gutters of 6.
-    let (columns, rows) = ((sheet.width() - 6) / 26, (sheet.height() - 6) / 39);
-    assert_eq!((sheet.width(), sheet.height()), (6 + columns * 26, 6 + rows * 39));
+    // 9 tiles of 20 x 20 with 19 lines of label, as far apart as the longest label is wide (letters of 5 + 1): columns times rows of them, and
+    // gutters of 6.
+    let letters = |l: &irradiant::LayerLight| format!("{} {:.2} %", l.name, 100.0 * l.share).len();
+    let label = rendering.layer_light().iter().map(letters).max().unwrap_or(0) * 6 - 1;
+    assert!(label > 100, "{label}");
+    let (columns, rows) = ((sheet.width() - 6) / (label + 6), (sheet.height() - 6) / 39);
+    assert_eq!((sheet.width(), sheet.height()), (6 + columns * (label + 6), 6 + rows * 39));
     assert!(columns * rows >= 9 && columns * (rows - 1) < 9);
     // The first tile is the picture, as a display shows it.
     let shown = irradiant::image::to_srgb8(
