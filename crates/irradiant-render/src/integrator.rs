@@ -133,6 +133,8 @@ pub enum SceneHas {
     Lamps,
     /// Area lights.
     AreaLights,
+    /// Lamps that nothing can be drawn from: curves.
+    CurvedLamps,
     /// Ways to a lamp that light samples do not find: delta lobes; a mix that comes to an interface; lamps that are curves.
     UnsampledWays,
 }
@@ -146,9 +148,11 @@ impl SceneHas {
             Self::DeltaLobes => scene.materials.may_be_specular(),
             Self::Lamps => !lights.iter().all(Light::is_delta),
             Self::AreaLights => lights.iter().any(|l| matches!(l, Light::Area(_))),
+            Self::CurvedLamps => {
+                lights.iter().any(|l| matches!(l, Light::Area(lamp) if !lamp.shape.can_be_drawn_from()))
+            }
             Self::UnsampledWays => {
-                let curve = |l: &Light| matches!(l, Light::Area(lamp) if !lamp.shape.can_be_drawn_from());
-                Self::DeltaLobes.is_in(scene) || scene.materials.may_pass() || lights.iter().any(curve)
+                Self::DeltaLobes.is_in(scene) || scene.materials.may_pass() || Self::CurvedLamps.is_in(scene)
             }
         }
     }

@@ -61,7 +61,9 @@ impl Integrator for LightTraceIntegrator {
 
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
-        depth.into_iter().chain([Limit::Unfound(UNSEEN, &[SceneHas::DeltaLobes])]).collect()
+        let lobes = Limit::Unfound(UNSEEN, &[SceneHas::DeltaLobes]);
+        let curves = Limit::Unfound("what lamps that are curves shine on", &[SceneHas::CurvedLamps]);
+        depth.into_iter().chain([lobes, curves]).collect()
     }
 }
 
