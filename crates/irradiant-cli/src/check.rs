@@ -3,8 +3,6 @@
 use crate::exit::Exit;
 use crate::say::say;
 use clap::Args;
-use irradiant::core::film::Film;
-use irradiant::core::scene::LayerPlan;
 use irradiant::{Job, RenderSettings};
 use std::path::PathBuf;
 
@@ -56,11 +54,10 @@ pub fn run(arguments: &CheckArguments) -> Exit {
         "  lights       {} ({} from emitting shapes, {} infinite)",
         facts.lights, facts.area_lights, facts.infinite_lights
     );
-    let film_bytes = job.scene.bounds().area() as u64 * Film::bytes_per_pixel(LayerPlan::channels_of(&file.desc.film));
     println!(
         "  memory       {:.1} MB of geometry, {:.1} MB of film",
         facts.geometry_bytes as f64 / 1e6,
-        film_bytes as f64 / 1e6
+        job.film_bytes() as f64 / 1e6
     );
     let not_honoured: Vec<&str> = job.report.diagnostics.not_honoured().collect();
     if not_honoured.is_empty() {

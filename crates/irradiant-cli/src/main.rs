@@ -56,7 +56,13 @@ fn main() -> ExitCode {
         default_hook(info);
         say!("irradiant: this is a bug; please report it with the scene and the command");
     }));
-    let arguments = Arguments::parse();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        let _ = error.print();
+        if error.kind() == clap::error::ErrorKind::UnknownArgument {
+            render::say_audit_hint();
+        }
+        std::process::exit(error.exit_code());
+    });
     let run = || match arguments.command {
         Command::Render(a) if a.picture.asks_for_integrators() => integrators::list(),
         Command::Probe(a) if a.picture.asks_for_integrators() => integrators::list(),

@@ -33,7 +33,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "MODE", value_parser = parse_self_intersection, conflicts_with_all = ["integrator", "estimator"])]
     self_intersection: Option<SelfIntersection>,
     /// Trace light from the lamps too (so many paths), and print where the energy goes
-    #[arg(long, value_name = "PATHS", num_args = 0..=1, require_equals = true, default_missing_value = "200000", value_parser = clap::value_parser!(u64).range(1000..=1_000_000_000))]
+    #[arg(long, value_name = "PATHS", num_args = 0..=1, require_equals = true, default_missing_value = "200000", value_parser = parse_audit)]
     audit: Option<u64>,
     /// Threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -63,6 +63,25 @@ pub struct RenderArguments {
 #[derive(Clone, Debug)]
 struct SelfIntersection(Option<IntegratorChoice>);
 
+/// Particles of `--audit`.
+fn parse_audit(text: &str) -> Result<u64, String> {
+    let wanted = "a whole number of paths from 1000 to 1000000000, e.g. --audit=200000; --audit alone takes 200000";
+    match text.parse() {
+        Ok(n @ 1000..=1_000_000_000) => Ok(n),
+        Ok(n) => Err(format!("{n} is not between 1000 and 1000000000: write {wanted}")),
+        Err(_) => Err(format!("\"{text}\" is not a number: write {wanted}")),
+    }
+}
+
+/// A number that stands behind `--audit` as a word of its own is read as a scene's name: says how to write it.
+pub fn say_audit_hint() {
+    let words: Vec<String> = std::env::args().collect();
+    let number = words.windows(2).find(|w| w[0] == "--audit" && w[1].parse::<u64>().is_ok()).map(|w| &w[1]);
+    if let Some(number) = number {
+        say!("help: for an audit of {number} paths write --audit={number}");
+    }
+}
+
 fn parse_self_intersection(text: &str) -> Result<SelfIntersection, String> {
     if text == "robust" {
         return Ok(SelfIntersection(None));
@@ -81,7 +100,13 @@ fn parse_self_intersection(text: &str) -> Result<SelfIntersection, String> {
 pub fn run(arguments: &RenderArguments) -> Exit {
     match render(arguments) {
         Ok(exit) => exit,
-        Err(error) => Exit::of(&error),
+        Err(error) => {
+            let exit = Exit::of(&error);
+            if matches!(error, Error::Unreadable { .. }) {
+                say_audit_hint();
+            }
+            exit
+        }
     }
 }
 
@@ -98,6 +123,14 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     settings.time_limit = arguments.time;
     settings.aovs = arguments.aov.clone();
     if let Some(SelfIntersection(Some(choice))) = &arguments.self_intersection {
+        if !arguments.aov.is_empty() {
+            return Err(Error::Settings(
+                "--aov and --self-intersection do not go together: layers are those of the integrator path, and ways of leaving a \
+                 surface are shown by the integrator selfintersection; leave one of the two out (--self-intersection robust is what \
+                 path does)"
+                    .into(),
+            ));
+        }
         settings.integrator = Some(choice.clone());
     }
     if arguments.preview {
@@ -183,8 +216,10 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     }
     if !arguments.quiet {
         report_layers(&rendering);
-        report_missing_light(&job, &rendering);
-        let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
+        report_missing_light(&job);
+        report_black(&job, &rendering);
+        let names: Vec<String> =
+            outputs.iter().chain(&arguments.contact_sheet).map(|p| p.display().to_string()).collect();
         let (seconds, cpu) = clock.total();
         say!(
             "wrote {} ({}, {:.1} CPU s, {}paths/s)",
@@ -278,13 +313,26 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
     {
         return Err(Error::Settings(format!("--contact-sheet {}: sheets are .png", path.display())));
     }
+    let format = |path: &PathBuf| FileFormat::from_name(&path.to_string_lossy());
     for path in &paths {
-        let known = FileFormat::from_name(&path.to_string_lossy());
-        if known.is_none_or(|f| matches!(f, FileFormat::Tga | FileFormat::Bmp)) {
+        if format(path).is_none_or(|f| matches!(f, FileFormat::Tga | FileFormat::Bmp)) {
             return Err(Error::Settings(format!(
                 "--output {}: not a kind of picture that can be written; these can: .exr .png .pfm .hdr .qoi .jpg",
                 path.display()
             )));
+        }
+    }
+    if !arguments.aov.is_empty() && !paths.iter().any(|path| format(path) == Some(FileFormat::Exr)) {
+        let names = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+        if arguments.contact_sheet.is_none() {
+            return Err(Error::Settings(format!(
+                "--aov: {names} cannot hold layers; write an .exr too (-o layers.exr), or --contact-sheet sheet.png to look at them"
+            )));
+        }
+        if !arguments.quiet {
+            say!(
+                "warning: --aov: {names} cannot hold layers, which will be on the contact sheet only; an .exr holds them"
+            );
         }
     }
     Ok(paths)
@@ -327,26 +375,43 @@ fn report_layers(rendering: &Rendering) {
         say!("  {:widest$} {:9.4} %  {}{ratio}", layer.name, 100.0 * layer.share, layer.expression);
         before = bounces.map(|i| (i, layer.share));
     }
-    if let Some(t) = rendering.truncation() {
-        say!(
-            "maxdepth {} leaves out light: about {:.2} % of the picture's, if its terms go on to fall by {:.3} each",
-            t.max_depth,
-            100.0 * t.missing,
-            t.ratio
-        );
-    }
 }
 
-/// What a depth limit leaves out, unless the layers have told.
-fn report_missing_light(job: &Job, rendering: &Rendering) {
-    if rendering.truncation().is_none()
-        && let Some(max_depth) = job.max_depth()
-        && let Some(missing) = job.missing_light()
+/// Paths with light beyond the depth limit from which its amount and its error can be told.
+const ENOUGH: u64 = 16;
+
+/// What a depth limit leaves out.
+fn report_missing_light(job: &Job) {
+    let (Some(max_depth), Some(missing)) = (job.max_depth(), job.missing_light()) else { return };
+    if missing.found < ENOUGH {
+        say!(
+            "maxdepth {max_depth}: of {} paths without limit {} found light beyond it, too few to say how much it leaves out",
+            missing.paths,
+            missing.found
+        );
+        return;
+    }
+    say!(
+        "maxdepth {max_depth} leaves out light: {:.2} % of the picture's, +- {:.2}, by {} paths without limit",
+        100.0 * missing.share,
+        100.0 * missing.standard_error,
+        missing.paths
+    );
+}
+
+/// A picture without any light is seldom what was wanted.
+fn report_black(job: &Job, rendering: &Rendering) {
+    let b = rendering.film.bounds();
+    let pixels = || (b.y0..b.y1).flat_map(|y| (b.x0..b.x1).map(move |x| (x, y)));
+    let splats = rendering.film.has_splats();
+    if !splats
+        && pixels().all(|(x, y)| rendering.film.pixel(x, y).mean() == [0.0; 3])
+        && rendering.film.totals().samples > 0
     {
         say!(
-            "maxdepth {max_depth} leaves out light: {:.2} % of the picture's, +- {:.2}, by a few paths without limit",
-            100.0 * missing.share,
-            100.0 * missing.standard_error
+            "warning: the picture is black: none of its paths found light by {}; is there a lamp, does the camera see what it \
+             lights, and can this estimator find it (see the label above)?",
+            job.integrator_choice()
         );
     }
 }

@@ -4,7 +4,7 @@ use cpu_time::ProcessTime;
 use irradiant::core::scene::Scene;
 use irradiant::renderer::RenderStats;
 use irradiant::renderer::inspect::EnergyAudit;
-use irradiant::renderer::inspect::audit::Power;
+use irradiant::renderer::inspect::audit::{MaterialBooks, Power};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -86,7 +86,14 @@ pub fn peak_memory_bytes() -> Option<u64> {
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
 }
 
-/// The books of energy as lines.
+/// Standard errors beyond which a material is named: once in 16,000 where all is right.
+const SUSPICIOUS: f64 = 4.0;
+const PBRT: &str =
+    ", known: pbrt-v4's weights evaluate its rough coat brighter than it is sampled (\"integer maxdepth\" 0 is exact)";
+const DISAGREES: &str = ": how it is sampled and how it is evaluated disagree; please report the scene";
+
+/// The books of energy as lines. Where something is missing, the materials that are known to be evaluated brighter than they are sampled,
+/// and those that are off by more than [`SUSPICIOUS`].
 pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
     let total = books.emitted.watts.max(f64::MIN_POSITIVE);
     let line = |name: &str, p: &Power| {
@@ -96,37 +103,52 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
     text += &line("emitted", &books.emitted);
     text += &format!("{:<24} {:>14.6e} W\n", "  by the lights' formula", books.emitted_by_formula);
     text += &line("absorbed", &books.absorbed);
-    for (material, power) in &books.by_material {
-        text += &line(&format!("  by {}", scene.material_name(*material)), power);
+    for m in &books.by_material {
+        text += &line(&format!("  by {}", scene.material_name(m.material)), &m.absorbed);
     }
     text += &line("escaped", &books.escaped);
     text += &line("cut off by the limit", &books.cut_off);
-    text += &format!(
-        "{:<24} {:>14.6e} W +- {:.1e}  {:>8.3} %  {:+.2} standard errors\n",
-        "missing",
-        books.missing.watts,
-        books.missing.error,
-        100.0 * books.missing.watts / total,
-        books.z()
-    );
+    let missing = |name: &str, p: &Power, why: &str| {
+        let line = line(name, p);
+        format!("{}  {:+.2} standard errors{why}\n", line.trim_end(), p.z())
+    };
+    text += &missing("missing", &books.missing, "");
+    let known = books.by_material.iter().any(|m| m.evaluated_as_pbrt);
+    for m in &books.by_material {
+        let name = format!("  at {}", scene.material_name(m.material));
+        if m.evaluated_as_pbrt {
+            text += &missing(&name, &m.missing, PBRT);
+        } else if m.missing.z().abs() > SUSPICIOUS {
+            text += &missing(&name, &m.missing, DISAGREES);
+        }
+    }
+    if known {
+        text += &missing("  elsewhere", &books.missing_elsewhere, "");
+    }
     text
 }
 
 /// The same as JSON, watts.
 pub fn audit_as_json(scene: &Scene, books: &EnergyAudit) -> Value {
     let power = |p: &Power| json!({ "watts": p.watts, "error": p.error });
-    let materials: serde_json::Map<_, _> =
-        books.by_material.iter().map(|(id, p)| (format!("{} {}", id.0, scene.material_name(*id)), power(p))).collect();
+    let by_material = |side: &dyn Fn(&MaterialBooks) -> Value| -> serde_json::Map<_, _> {
+        let name = |m: &MaterialBooks| format!("{} {}", m.material.0, scene.material_name(m.material));
+        books.by_material.iter().map(|m| (name(m), side(m))).collect()
+    };
+    let missing = |m: &MaterialBooks| json!({ "watts": m.missing.watts, "error": m.missing.error, "evaluated_as_pbrt": m.evaluated_as_pbrt });
     json!({
         "particles": books.paths,
         "emitted": power(&books.emitted),
         "emitted_by_formula": books.emitted_by_formula,
         "absorbed": power(&books.absorbed),
-        "absorbed_by_material": materials,
+        "absorbed_by_material": by_material(&|m| power(&m.absorbed)),
         "escaped": power(&books.escaped),
         "cut_off": power(&books.cut_off),
         "missing": power(&books.missing),
-        "missing_in_standard_errors": books.z(),
+        "missing_in_standard_errors": books.missing.z(),
+        "missing_by_material": by_material(&missing),
+        "missing_elsewhere": power(&books.missing_elsewhere),
+        "missing_elsewhere_in_standard_errors": books.z(),
         "ended_by_roulette": books.ended_by_roulette,
         "mean_events": books.mean_events,
     })

@@ -61,7 +61,8 @@ fn stdout(output: &Output) -> String {
 #[test]
 fn integrators_are_listed_with_their_options_and_named_in_the_header() {
     let folder = Folder::new("integrators");
-    folder.write("scene.pbrt", SCENE);
+    folder.write("scene.pbrt", &SCENE.replace("Shape", "Material \"dielectric\"\nShape"));
+    folder.write("matt.pbrt", SCENE);
     let list = stdout(&folder.run(&["integrators"]));
     assert_eq!(list, stdout(&folder.run(&["render", "--integrator", "help"])));
     for word in ["path", "randomwalk", "samplebsdf=true", "lightsampler=scene", "exhaustive"] {
@@ -83,6 +84,22 @@ fn integrators_are_listed_with_their_options_and_named_in_the_header() {
     let header = String::from_utf8_lossy(&bytes);
     assert!(header.contains("simplepath samplelights=true samplebsdf=false lightsampler=scene"), "not in the header");
     assert!(header.contains("delta lobes"), "the label does not say what is left out");
+    // Only what the scene has can be lost.
+    let output = folder.run(&[
+        "render",
+        "matt.pbrt",
+        "-o",
+        "x.exr",
+        "--max-depth",
+        "none",
+        "--integrator",
+        "simplepath",
+        "--estimator",
+        "samplebsdf=false",
+        "--estimator",
+        "samplelights=false",
+    ]);
+    assert!(stderr(&output).contains(" unbiased\n"), "{}", stderr(&output));
     // Options of the scene's own integrator; and what stands in for it is no matter once another is asked for.
     folder.write("mlt.pbrt", &format!("Integrator \"mlt\"\n{SCENE}"));
     let strict = ["render", "mlt.pbrt", "-q", "-o", "y.exr", "--strict"];
@@ -171,6 +188,20 @@ fn exit_codes_tell_who_can_fix_it() {
         (&["probe", "ok.pbrt", "--pixel", "1,1", "--integrator", "randomwalk"], 2, "--integrator path"),
         (&["integrators", "simplpath"], 2, "did you mean \"simplepath\"?"),
         (&["render", "ok.pbrt", "-o", "x.gif"], 2, ".exr"),
+        (&["render", "--audit", "5000"], 66, "--audit=5000"),
+        (&["render", "ok.pbrt", "--audit", "5000"], 2, "--audit=5000"),
+        (&["render", "ok.pbrt", "--audit=abc"], 2, "\"abc\" is not a number: write a whole number of paths from 1000"),
+        (&["render", "ok.pbrt", "--audit=5"], 2, "5 is not between 1000 and"),
+        (
+            &["render", "ok.pbrt", "--aov", "gi", "-o", "x.png", "-o", "x.hdr"],
+            2,
+            "x.png, x.hdr cannot hold layers; write an .exr",
+        ),
+        (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "s=2"], 2, "try t=1 or t=2"),
+        (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "t=99"], 2, "--max-depth 97"),
+        (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "weighted=false"], 2, "s=1 and t=2"),
+        (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "t=1"], 2, "s=0 and t=2"),
+        (&["render", "ok.pbrt", "--aov", "a=L(D|)E"], 2, "D?"),
         (&["render", "ok.pbrt", "-o", "nowhere/x.exr"], 2, "nowhere"),
         (&["render", "ok.pbrt", "--crop", "0,2,0,1"], 2, "crop"),
         (&["probe", "ok.pbrt", "--pixel", "99,0"], 2, "columns 0 to 15"),
@@ -233,8 +264,23 @@ fn probe_replays_a_sample() {
     let output = folder.run(&["probe", "--pixel", "256,300", "--sample", "5"]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let text = stdout(&output);
-    for word in ["wavelengths", "vertex 0", "material white", "radiance", "film"] {
+    for word in ["wavelengths", "vertex 0", "material white", "radiance", "film", "survival: 1 after the first event"] {
         assert!(text.contains(word), "{word} is missing in {text}");
+    }
+    // The film's numbers follow from what is printed.
+    let numbers = |line: &str| -> Vec<f64> {
+        let inside = line.split(['[', ']']).nth(1).unwrap_or("");
+        inside.split_whitespace().map(|x| x.parse().expect("a number")).collect()
+    };
+    let line = |start: &str| text.lines().find(|l| l.trim_start().starts_with(start)).expect(start);
+    let radiance = numbers(line("radiance "));
+    let red: f64 = radiance.iter().zip(numbers(line("film R is"))).map(|(l, factor)| l * factor).sum();
+    let film = line("film         R").split_whitespace().nth(2).map(|x| x.parse::<f64>().expect("a number"));
+    assert!(film.is_some_and(|film| (film - red).abs() < 1e-4 * red.abs()), "{film:?} {red}: {text}");
+    // Light that nothing brought is told to be missing, of one sample and of many.
+    for paths in ["1", "4"] {
+        let none = stdout(&folder.run(&["probe", "--pixel", "256,300", "--bounces", "500..600", "--paths", paths]));
+        assert!(none.contains("light after 500 to 600 bounces"), "{none}");
     }
     assert_eq!(text, stdout(&folder.run(&["probe", "--pixel", "256,300", "--sample", "5"])));
 }
@@ -276,6 +322,21 @@ fn light_at_a_point_and_the_rendering_equation_are_measured() {
     assert!(stdout(&output).contains("standard error"), "{}", stdout(&output));
     // Paths need a pixel.
     assert_eq!(code(&folder.run(&["probe"])), 2);
+    // An equation that was tested nowhere does not hold.
+    folder.write("away.pbrt", &SCENE.replace("0 0 3", "0 0 -3"));
+    for form in [&[][..], &["--json"]] {
+        let output = folder.run(&[&["probe", "away.pbrt", "--residual", "5", "--rays", "2"], form].concat());
+        assert_eq!(code(&output), 2, "{}", stdout(&output));
+        assert!(stderr(&output).contains("nothing was tested") && output.stdout.is_empty(), "{}", stderr(&output));
+    }
+    // Nor has darkness a share.
+    folder.write("dark.pbrt", &SCENE.replace("LightSource \"infinite\"\n", ""));
+    let dark = folder.run(&["probe", "dark.pbrt", "--residual", "9", "--rays", "2", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&dark.stdout).expect("JSON");
+    assert!(
+        value["relative_residual"].is_null() && value["points"].as_array().is_some_and(|p| !p.is_empty()),
+        "{value}"
+    );
 }
 
 #[test]
@@ -313,11 +374,18 @@ fn ways_of_leaving_a_surface_are_labelled() {
         assert_eq!(code(&output), 0, "{}", stderr(&output));
         assert!(stderr(&output).contains(label), "{mode}: {}", stderr(&output));
     }
-    for bad in ["epsilon", "none=1", "magic", "epsilon=-1"] {
+    for bad in ["epsilon", "none=1", "magic", "epsilon=-1", "epsilon=inf", "epsilon=nan"] {
         assert_eq!(code(&render(bad, "a.exr")), 2, "{bad}");
     }
     let both = folder.run(&["render", "--self-intersection", "none", "--integrator", "path"]);
     assert_eq!(code(&both), 2);
+    let layers = folder.run(&["render", "--self-intersection", "none", "--aov", "gi"]);
+    assert_eq!(code(&layers), 2);
+    assert!(
+        !stderr(&layers).contains("--integrator path") && stderr(&layers).contains("leave one"),
+        "{}",
+        stderr(&layers)
+    );
 }
 
 #[test]
@@ -328,6 +396,17 @@ fn check_tells_what_a_scene_holds() {
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert!(stdout(&output).contains("16 x 12"), "{}", stdout(&output));
     assert!(stdout(&output).contains("truncated: maxdepth 5"), "{}", stdout(&output));
+    // Light that paths from lamps bring has memory of its own.
+    let film = |text: &str| -> f64 {
+        folder.write(
+            "m.pbrt",
+            &text.replace("xresolution\" 16", "xresolution\" 1600").replace("yresolution\" 12", "yresolution\" 1200"),
+        );
+        let said = stdout(&folder.run(&["check", "m.pbrt"]));
+        let line = said.lines().find(|l| l.contains("of film")).expect("a line about memory");
+        line.split(", ").nth(1).and_then(|s| s.split(' ').next()).and_then(|s| s.parse().ok()).expect("MB")
+    };
+    assert!(film(&format!("Integrator \"bdpt\"\n{SCENE}")) > 1.2 * film(SCENE));
 }
 
 #[test]
@@ -436,7 +515,14 @@ fn layers_are_written_beside_the_picture_and_told_of() {
     let output = folder.run(&[&["render", "-o", "box.exr"], &SMALL[..], &aov].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert_eq!(folder.names(), ["box.exr", "sheet.png"]);
-    for told in ["K2", "Krest", "L.*D'red'.*E", "maxdepth 2 leaves out light: about"] {
+    for told in [
+        "K2",
+        "Krest",
+        "L.*D'red'.*E",
+        "maxdepth 2 leaves out light: ",
+        " % of the picture's, +- ",
+        "box.exr, sheet.png",
+    ] {
         assert!(stderr(&output).contains(told), "{told}: {}", stderr(&output));
     }
     let file = std::fs::read(folder.0.join("box.exr")).expect("readable");
@@ -446,6 +532,32 @@ fn layers_are_written_beside_the_picture_and_told_of() {
     }
     let sheet = std::fs::read(folder.0.join("sheet.png")).expect("readable");
     assert!(irradiant::image::read(&sheet, "sheet.png", &irradiant::image::ReadOptions::default()).is_ok());
+}
+
+#[test]
+fn pictures_that_cannot_hold_layers_are_told_of() {
+    let folder = Folder::new("no-layers");
+    let sheet = ["render", "-o", "box.png", "--aov", "gi", "--contact-sheet", "sheet.png"];
+    let output = folder.run(&[&sheet[..], &SMALL[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stderr(&output).contains("warning: --aov: box.png cannot hold layers"), "{}", stderr(&output));
+    // Beside an .exr that holds them there is nothing to say.
+    let output = folder.run(&[&["render", "-o", "box.png", "-o", "box.exr", "--aov", "gi"], &SMALL[..]].concat());
+    assert!(code(&output) == 0 && !stderr(&output).contains("warning"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_black_picture_is_told_of() {
+    let folder = Folder::new("black");
+    folder.write("point.pbrt", &SCENE.replace("infinite", "point"));
+    let output = folder.run(&["render", "point.pbrt", "-o", "x.exr", "--integrator", "try2"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("delta lights") && said.contains("the picture is black"), "{said}");
+    // With too few paths that found any, nothing is said of how much light a limit leaves out.
+    let output = folder.run(&["render", "point.pbrt", "-o", "x.exr", "--max-depth", "1"]);
+    let said = stderr(&output);
+    assert!(said.contains("0 found light beyond it") && !said.contains("black"), "{said}");
 }
 
 #[test]

@@ -68,6 +68,11 @@ impl Bsdf {
         self.bxdf.spread(self.frame.to_local(wo), self.frame.to_local(wi))
     }
 
+    /// Where lobes of light from `wo` that may be narrow have their peaks: see [`Bxdf::peaks`].
+    pub fn peaks(&self, wo: Vec3) -> [Option<Vec3>; 2] {
+        self.bxdf.peaks(self.frame.to_local(wo)).map(|peak| peak.map(|w| self.frame.from_local(w)))
+    }
+
     /// Whether the directions lie on different sides.
     #[inline]
     pub fn is_transmitted(&self, wo: Vec3, wi: Vec3) -> bool {

@@ -1,6 +1,7 @@
 //! The open set: what walks a scene, one call per work unit.
 
 use irradiant_core::film::{FilmTile, PixelBounds};
+use irradiant_core::light::Light;
 use irradiant_core::scene::Scene;
 use std::ops::{AddAssign, Range};
 
@@ -101,7 +102,8 @@ pub trait Integrator: Send + Sync {
         Ok(())
     }
 
-    /// What makes the expected picture differ from the solution of the rendering equation; empty when unbiased.
+    /// What makes the expected picture differ from the solution of the rendering equation, whatever the scene; empty when unbiased. Of these
+    /// [`Limit::concerns`] a scene.
     fn limits(&self) -> Vec<Limit>;
 }
 
@@ -112,17 +114,65 @@ pub enum Limit {
     MaxDepth(u32),
     /// Named truncation.
     Truncation(String),
+    /// Light that the estimator cannot find; only scenes that have all of this have any.
+    Unfound(&'static str, &'static [SceneHas]),
     /// The estimator computes something else than the rendering equation's solution.
     OtherQuantity(&'static str),
     /// Named bias.
     Bias(String),
 }
 
+/// What a scene may have that some estimators cannot find light by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneHas {
+    /// Lights that no ray meets: points, spots, distant lights.
+    DeltaLights,
+    /// Materials with smooth mirrors or glass, for all that is known without looking textures up.
+    DeltaLobes,
+    /// Lights that rays meet: area lights and environments.
+    Lamps,
+    /// Area lights.
+    AreaLights,
+    /// Lamps that nothing can be drawn from: curves.
+    CurvedLamps,
+    /// Ways to a lamp that light samples do not find: delta lobes; a mix that comes to an interface; lamps that are curves.
+    UnsampledWays,
+}
+
+impl SceneHas {
+    /// Whether this scene has it.
+    pub fn is_in(self, scene: &Scene) -> bool {
+        let lights = scene.lights.as_slice();
+        match self {
+            Self::DeltaLights => lights.iter().any(Light::is_delta),
+            Self::DeltaLobes => scene.materials.may_be_specular(),
+            Self::Lamps => !lights.iter().all(Light::is_delta),
+            Self::AreaLights => lights.iter().any(|l| matches!(l, Light::Area(_))),
+            Self::CurvedLamps => {
+                lights.iter().any(|l| matches!(l, Light::Area(lamp) if !lamp.shape.can_be_drawn_from()))
+            }
+            Self::UnsampledWays => {
+                Self::DeltaLobes.is_in(scene) || scene.materials.may_pass() || Self::CurvedLamps.is_in(scene)
+            }
+        }
+    }
+}
+
+impl Limit {
+    /// Whether a picture of this scene is limited so.
+    pub fn concerns(&self, scene: &Scene) -> bool {
+        match self {
+            Self::Unfound(_, all) => all.iter().all(|what| what.is_in(scene)),
+            Self::MaxDepth(_) | Self::Truncation(_) | Self::OtherQuantity(_) | Self::Bias(_) => true,
+        }
+    }
+}
+
 impl std::fmt::Display for Limit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::MaxDepth(n) => write!(f, "maxdepth {n}"),
-            Self::OtherQuantity(what) => write!(f, "{what}"),
+            Self::OtherQuantity(what) | Self::Unfound(what, _) => write!(f, "{what}"),
             Self::Truncation(what) | Self::Bias(what) => write!(f, "{what}"),
         }
     }

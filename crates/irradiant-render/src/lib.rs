@@ -31,5 +31,5 @@ pub mod shared_path;
 pub mod simple_path;
 pub mod truncation;
 
-pub use integrator::{Integrator, Limit, RenderStats, WorkUnit};
+pub use integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};
 pub use session::{Progress, Session, SessionSettings};

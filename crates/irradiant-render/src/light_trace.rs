@@ -7,7 +7,7 @@
 //! smooth mirrors and glass: no path from a light meets a pinhole by itself. The picture lacks it, and the header says so.
 
 use crate::camera_samples::{CameraSample, for_each_sample};
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};
 use crate::light_walk::{Arrival, shading_correction, start, walk};
 use crate::registry::IntegratorEntry;
 use crate::simple_path::environment;
@@ -61,7 +61,9 @@ impl Integrator for LightTraceIntegrator {
 
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
-        depth.into_iter().chain([Limit::Truncation(UNSEEN.into())]).collect()
+        let lobes = Limit::Unfound(UNSEEN, &[SceneHas::DeltaLobes]);
+        let curves = Limit::Unfound("what lamps that are curves shine on", &[SceneHas::CurvedLamps]);
+        depth.into_iter().chain([lobes, curves]).collect()
     }
 }
 

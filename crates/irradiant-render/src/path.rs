@@ -547,6 +547,9 @@ pub fn power_heuristic(a: f32, b: f32) -> f32 {
 /// After this many events even a path that loses nothing is ended now and then, so that closed scenes of albedo 1 end.
 const LONG_PATH: u32 = 128;
 
+/// The rule by which paths survive ([`Roulette::Throughput`]), in words.
+pub const SURVIVAL_RULE: &str = "1 after the first event; later twice the largest throughput, eta^2 of refractions taken out; at most 1, from 128 events on 0.95";
+
 /// Throughput below which paths are ended by chance.
 ///
 /// 64 samples per pixel of a Cornell box in RGB, error (relMSE) times CPU time against 1: roulette below 1 (as pbrt-v4)

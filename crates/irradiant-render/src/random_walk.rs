@@ -2,7 +2,7 @@
 //! (pbrt-v4's `randomwalk`). Noisy beyond use for small lights; blind to delta lights and mirrors.
 
 use crate::camera_samples::for_each_sample;
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};
 use crate::registry::IntegratorEntry;
 use crate::simple_path::environment;
 use irradiant_core::bxdf::TransportMode;
@@ -84,6 +84,8 @@ impl Integrator for RandomWalkIntegrator {
 
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
-        depth.into_iter().chain([Limit::OtherQuantity("radiance without delta lights and delta lobes")]).collect()
+        let lights = Limit::Unfound("delta lights", &[SceneHas::DeltaLights]);
+        let lobes = Limit::Unfound("delta lobes", &[SceneHas::DeltaLobes]);
+        depth.into_iter().chain([lights, lobes]).collect()
     }
 }

@@ -63,7 +63,7 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
         },
         OptionEntry {
             name: "epsilon",
-            range: OptionRange::Number(0.0, f32::INFINITY),
+            range: OptionRange::Number(0.0, 1e9),
             default: Value::Number(1e-4),
             doc: "scene units, for leaving=epsilon (A67)",
         },

@@ -79,6 +79,8 @@ struct Second {
 }
 
 /// Light that leaves a surface.
+// Kept from block to block: a box would be allocated at each surface.
+#[allow(clippy::large_enum_variant)]
 enum Scattered {
     /// The same radiance in all directions of the side of this normal.
     Evenly { normal: Vec3, radiance: SampledSpectrum },

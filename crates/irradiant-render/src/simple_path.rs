@@ -2,7 +2,7 @@
 //! textbook's second estimator (pbrt-v4's `simplepath`).
 
 use crate::camera_samples::for_each_sample;
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};
 use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
 use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::film::FilmTile;
@@ -157,8 +157,8 @@ impl Integrator for SimplePathIntegrator {
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
         // What chance cannot find.
-        let lights = (!self.sample_lights).then(|| Limit::Truncation("delta lights".into()));
-        let lobes = (!self.sample_bsdf).then(|| Limit::Truncation("delta lobes".into()));
+        let lights = (!self.sample_lights).then_some(Limit::Unfound("delta lights", &[SceneHas::DeltaLights]));
+        let lobes = (!self.sample_bsdf).then_some(Limit::Unfound("delta lobes", &[SceneHas::DeltaLobes]));
         depth.into_iter().chain(lights).chain(lobes).collect()
     }
 }

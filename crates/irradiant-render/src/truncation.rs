@@ -13,8 +13,12 @@ use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 pub struct MissingLight {
     /// Its luminance over that of what the limit leaves.
     pub share: f64,
-    /// One standard error of `share`, about.
+    /// One standard error of `share`, about. Not to be trusted where few paths found light beyond the limit.
     pub standard_error: f64,
+    /// Paths followed.
+    pub paths: u64,
+    /// Of them: those that found light beyond the limit.
+    pub found: u64,
 }
 
 /// Sorts a path's contributions by the limit.
@@ -75,5 +79,6 @@ pub fn missing_light(scene: &Scene, path: &PathIntegrator, paths: u32) -> Option
     }
     let share = beyond / within;
     let residual: f64 = pairs.iter().map(|p| (p[1] - share * p[0]) * (p[1] - share * p[0])).sum();
-    Some(MissingLight { share, standard_error: residual.sqrt() / within })
+    let found = pairs.iter().filter(|p| p[1] > 0.0).count() as u64;
+    Some(MissingLight { share, standard_error: residual.sqrt() / within, paths: pairs.len() as u64, found })
 }

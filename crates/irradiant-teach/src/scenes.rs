@@ -43,7 +43,7 @@ pub fn furnace_room(rho: f64) -> String {
 
 /// Corners of a side of the cube from -1 to 1: x = -1, x = 1, y = -1, and so on.
 fn side_of_cube(i: usize) -> [[f32; 3]; 4] {
-    let (axis, side) = (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 });
+    let (axis, side) = (i / 2, if i.is_multiple_of(2) { -1.0 } else { 1.0 });
     let corner = |u: f32, v: f32| {
         let mut p = [0.0; 3];
         (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, u, v);

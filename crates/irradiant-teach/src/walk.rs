@@ -245,7 +245,7 @@ impl Estimator for Walk {
             if let Some(light) = at.light {
                 let mut emitted = scene.lights.get(light).emitted(at.n, at.uv, at.wo, lambda);
                 if self.wrong == Wrong::EmissionFades {
-                    emitted = emitted * (1.0 / (1.0 + 0.01 * at.t));
+                    emitted *= 1.0 / (1.0 + 0.01 * at.t);
                 }
                 let (pdf, bsdf_pdf, specular) = previous.as_ref().map_or((0.0, 0.0, false), |p| {
                     let pdf = scene.lights.get(light).pdf_hit(&p.at, ray.d, &(&at).into());
@@ -355,7 +355,7 @@ impl Estimator for Walk {
                 if s.lobe.is_transmissive() {
                     eta_scale *= s.eta * s.eta;
                     if self.wrong == Wrong::NoSquaredIndex {
-                        f = f * (s.eta * s.eta);
+                        f *= s.eta * s.eta;
                     }
                 }
                 throughput *= f;

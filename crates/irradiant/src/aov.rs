@@ -1,7 +1,8 @@
 //! Layers of a picture, as a user asks for them: one render taken apart by kinds of paths.
 
 use crate::error::Error;
-use irradiant_core::film::{Film, Layer};
+use crate::render::film_bytes;
+use irradiant_core::film::Layer;
 use irradiant_core::scene::{CompileOptions, Scene};
 use irradiant_render::expression::PathExpression;
 use irradiant_render::expression::automaton::UNGROUPED;
@@ -142,7 +143,7 @@ impl Aov {
 }
 
 /// Declares the layers in the scene and compiles them; `None` when none are asked for.
-pub(crate) fn declare(aovs: &[Aov], scene: &mut Scene) -> Result<Option<PathLayers>, Error> {
+pub(crate) fn declare(aovs: &[Aov], scene: &mut Scene, options: &CompileOptions) -> Result<Option<PathLayers>, Error> {
     if aovs.is_empty() {
         return Ok(None);
     }
@@ -157,24 +158,23 @@ pub(crate) fn declare(aovs: &[Aov], scene: &mut Scene) -> Result<Option<PathLaye
             return Err(Error::Settings(format!("--aov: two layers are called \"{}\"; rename one", l.name)));
         }
     }
-    check_memory(scene, layers.len())?;
+    check_memory(scene, layers.len(), options)?;
     let compiled = PathLayers::new(layers, scene).map_err(|why| Error::Settings(format!("--aov: {why}")))?;
     scene.layers.declare_paths(compiled.film_layers());
     Ok(Some(compiled))
 }
 
 /// Complains of films that are too large for the memory they may take, before anything is reserved.
-fn check_memory(scene: &Scene, layers: usize) -> Result<(), Error> {
-    let channels = (scene.layers.channels() + 3 * layers) as u64;
-    let bytes = (scene.bounds().area() as u64).saturating_mul(Film::bytes_per_pixel(channels));
-    let limit = CompileOptions::MAX_FILM_BYTES;
+fn check_memory(scene: &Scene, layers: usize, options: &CompileOptions) -> Result<(), Error> {
+    let bytes = film_bytes(scene, layers, options.splats);
+    let limit = options.max_film_bytes;
     if bytes <= limit {
         return Ok(());
     }
     let gib = |bytes: u64| bytes as f64 / (1u64 << 30) as f64;
     Err(Error::Settings(format!(
         "--aov: a film of {} x {} pixels with {layers} layers takes {:.1} GiB of memory; {:.1} are allowed: ask for fewer \
-         layers, a smaller picture (--resolution) or a part of it (--crop)",
+         layers, a smaller picture (--resolution) or a part of it (--crop), or allow more (--max-film-memory)",
         scene.bounds().width(),
         scene.bounds().height(),
         gib(bytes),

@@ -19,6 +19,8 @@ const INK: [u8; 3] = [224; 3];
 /// Where the tiles of a sheet stand.
 struct Grid {
     tile: [usize; 2],
+    /// Of a tile with its label.
+    column: usize,
     columns: usize,
     rows: usize,
     /// Size of a letter's dot.
@@ -26,15 +28,18 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(picture: [usize; 2], n: usize) -> Self {
+    /// For `n` pictures of this size, with labels that are at most so wide in the smallest letters.
+    fn new(picture: [usize; 2], n: usize, label: usize) -> Self {
         let width = picture[0].clamp(1, TILE);
         let height = (picture[1] * width).div_ceil(picture[0].max(1)).max(1);
-        let most = ((SHEET - GUTTER) / (width + GUTTER)).max(1);
+        // Small pictures stand further apart, so that one can read what they are.
+        let column = width.max(label.min(TILE));
+        let most = ((SHEET - GUTTER) / (column + GUTTER)).max(1);
         // About as wide as high, in whole rows where that is easy.
-        let square = (1..).find(|c| c * c * width >= n * height).unwrap_or(1);
+        let square = (1..).find(|c| c * c * column >= n * height).unwrap_or(1);
         let columns = square.min(most).min(n).max(1);
         let dot = if width >= 200 { 2 } else { 1 };
-        Self { tile: [width, height], columns, rows: n.div_ceil(columns), dot }
+        Self { tile: [width, height], column, columns, rows: n.div_ceil(columns), dot }
     }
 
     fn label_height(&self) -> usize {
@@ -42,15 +47,15 @@ impl Grid {
     }
 
     fn size(&self) -> [usize; 2] {
-        let [width, height] = self.tile;
-        [GUTTER + self.columns * (width + GUTTER), GUTTER + self.rows * (height + self.label_height())]
+        let [_, height] = self.tile;
+        [GUTTER + self.columns * (self.column + GUTTER), GUTTER + self.rows * (height + self.label_height())]
     }
 
     /// Upper left corner of a tile.
     fn at(&self, i: usize) -> [usize; 2] {
-        let [width, height] = self.tile;
+        let [_, height] = self.tile;
         let (column, row) = (i % self.columns, i / self.columns);
-        [GUTTER + column * (width + GUTTER), GUTTER + row * (height + self.label_height())]
+        [GUTTER + column * (self.column + GUTTER), GUTTER + row * (height + self.label_height())]
     }
 }
 
@@ -64,7 +69,8 @@ impl Rendering {
             let channels = ["R", "G", "B"].map(|c| format!("{}.{c}", l.name));
             (format!("{} {:.2} %", l.name, 100.0 * l.share), channels)
         }));
-        let grid = Grid::new([image.width(), image.height()], labels.len());
+        let widest = labels.iter().map(|(label, _)| text_width(label, 1)).max().unwrap_or(0);
+        let grid = Grid::new([image.width(), image.height()], labels.len(), widest);
         let [width, height] = grid.size();
         let mut codes = vec![BACKGROUND; width * height * 3];
         for (i, (_, channels)) in labels.iter().enumerate() {
@@ -89,8 +95,9 @@ impl Rendering {
         for (i, (label, _)) in labels.iter().enumerate() {
             let [left, top] = grid.at(i);
             let mut label = label.clone();
-            let dot = if text_width(&label, grid.dot) > grid.tile[0] { 1 } else { grid.dot };
-            while text_width(&label, dot) > grid.tile[0] {
+            let dot = if text_width(&label, grid.dot) > grid.column { 1 } else { grid.dot };
+            // Only names of more than fifty letters are too long even so.
+            while text_width(&label, dot) > grid.column {
                 label.pop();
             }
             write_text(&mut sheet, [left, top + grid.tile[1] + GUTTER], dot, &label, INK);
@@ -123,17 +130,18 @@ mod tests {
     #[test]
     fn sheets_are_of_a_size_to_look_at_and_tiles_do_not_overlap() {
         for picture in [[1, 1], [16, 12], [512, 512], [4000, 100], [100, 4000]] {
-            for n in [1, 2, 4, 9, 18, 65] {
-                let grid = Grid::new(picture, n);
+            for (n, label) in [(1, 0), (2, 70), (4, 150), (9, 100), (18, 90), (65, 500)] {
+                let grid = Grid::new(picture, n, label);
                 let [width, height] = grid.size();
                 assert!(width <= SHEET.max(TILE + 2 * GUTTER), "{picture:?} {n}");
                 assert!(grid.columns * grid.rows >= n && (grid.rows - 1) * grid.columns < n);
+                assert!(grid.column >= label.min(TILE), "{picture:?} {n}: labels are cut");
                 for i in 0..n {
                     let [x, y] = grid.at(i);
-                    assert!(x + grid.tile[0] + GUTTER <= width && y + grid.tile[1] + grid.label_height() <= height);
+                    assert!(x + grid.column + GUTTER <= width && y + grid.tile[1] + grid.label_height() <= height);
                     if i > 0 {
                         let [px, py] = grid.at(i - 1);
-                        assert!(x >= px + grid.tile[0] + GUTTER || y >= py + grid.tile[1] + grid.label_height());
+                        assert!(x >= px + grid.column + GUTTER || y >= py + grid.tile[1] + grid.label_height());
                     }
                 }
             }

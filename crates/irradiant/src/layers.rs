@@ -1,4 +1,4 @@
-//! A finished picture's layers as numbers: how much light each holds, and what a depth limit leaves out.
+//! A finished picture's layers as numbers: how much light each holds.
 
 use crate::render::Rendering;
 use irradiant_core::film::Layer;
@@ -14,17 +14,6 @@ pub struct LayerLight {
     pub mean: [f64; 3],
     /// Its luminance over the picture's; 0 for a black picture.
     pub share: f64,
-}
-
-/// What a depth limit leaves out, by the ratio of the last terms of the Neumann series.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truncation {
-    /// Scattering events at most.
-    pub max_depth: u32,
-    /// Ratio of a term to the one before it.
-    pub ratio: f64,
-    /// Luminance that is left out over that of the picture, if the terms go on in this ratio: an estimate.
-    pub missing: f64,
 }
 
 impl Rendering {
@@ -53,18 +42,5 @@ impl Rendering {
             list.push(LayerLight { name: name.clone(), expression: expression.clone(), mean, share });
         }
         list
-    }
-
-    /// What the depth limit leaves out, where there is one and the layers `K...` reach it; `None` else, or where the last
-    /// terms do not fall.
-    pub fn truncation(&self) -> Option<Truncation> {
-        let max_depth = self.max_depth.filter(|&n| n >= 2)?;
-        let layers = self.layer_light();
-        let share = |i: u32| layers.iter().find(|l| l.name == format!("K{i}")).map(|l| l.share);
-        let last = share(max_depth)?;
-        // Over two steps where there are as many scattered terms, since light often alternates between surfaces.
-        let steps = if max_depth >= 3 { 2 } else { 1 };
-        let ratio = (last / share(max_depth - steps)?).powf(1.0 / f64::from(steps));
-        (ratio < 1.0).then(|| Truncation { max_depth, ratio, missing: last * ratio / (1.0 - ratio) })
     }
 }

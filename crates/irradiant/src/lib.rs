@@ -32,7 +32,7 @@ mod settings;
 pub use aov::Aov;
 pub use error::{Error, Report};
 pub use header::Header;
-pub use layers::{LayerLight, Truncation};
+pub use layers::LayerLight;
 pub use load::{SceneFile, cornell_box, load, load_text};
 pub use render::{Job, Rendering, render};
 pub use settings::{ColorMode, MaxDepth, RenderSettings};

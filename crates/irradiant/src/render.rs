@@ -82,7 +82,7 @@ impl Job {
                 integrator.name()
             )));
         }
-        let layers = aov::declare(&settings.aovs, &mut scene)?.map(Arc::new);
+        let layers = aov::declare(&settings.aovs, &mut scene, &options)?.map(Arc::new);
         let scene = Arc::new(scene);
         let samples_per_pixel = scene.samples_per_pixel;
         let mut job = Self {
@@ -114,6 +114,15 @@ impl Job {
         integrator.check(&job.scene).map_err(Error::Settings)?;
         job.header.estimate = estimate_label(integrator.as_ref(), &job.scene);
         Ok(job)
+    }
+
+    /// Memory that the picture's sums take, bytes: of the picture, of its layers, and of what comes from paths that begin at lights.
+    pub fn film_bytes(&self) -> u64 {
+        film_bytes(
+            &self.scene,
+            self.layers.as_ref().map_or(0, |layers| layers.as_slice().len()),
+            self.integrator().splats(),
+        )
     }
 
     /// The integrator, with its limits.
@@ -161,14 +170,7 @@ impl Job {
         if (totals.min_count, totals.max_count) != (wanted, wanted) {
             header.samples_taken = Some([totals.min_count, totals.max_count]);
         }
-        Rendering {
-            film,
-            stats,
-            header,
-            variance: self.scene.layers.variance,
-            color_space: self.scene.color_space(),
-            max_depth: self.max_depth,
-        }
+        Rendering { film, stats, header, variance: self.scene.layers.variance, color_space: self.scene.color_space() }
     }
 }
 
@@ -182,7 +184,6 @@ pub struct Rendering {
     pub header: Header,
     variance: bool,
     pub(crate) color_space: &'static ColorSpace,
-    pub(crate) max_depth: Option<u32>,
 }
 
 impl Rendering {
@@ -238,6 +239,13 @@ pub fn render(file: &SceneFile, settings: &RenderSettings) -> Result<Rendering, 
     Ok(job.rendering(film, stats))
 }
 
+/// Memory of a scene's film with so many layers of paths, bytes.
+pub(crate) fn film_bytes(scene: &Scene, path_layers: usize, splats: bool) -> u64 {
+    let of_splats = if splats { Film::SPLAT_BYTES_PER_PIXEL } else { 0 };
+    let channels = (scene.layers.channels() + 3 * path_layers) as u64;
+    (scene.bounds().area() as u64).saturating_mul(Film::bytes_per_pixel(channels) + of_splats)
+}
+
 /// A layer in words that determine its pixels.
 fn describe(layer: &PathLayer) -> String {
     format!("{} = {}", layer.name, layer.expression.text())
@@ -246,6 +254,7 @@ fn describe(layer: &PathLayer) -> String {
 /// "unbiased", or why not: what is left out, what is biased, what else is estimated.
 fn estimate_label(integrator: &dyn Integrator, scene: &Scene) -> String {
     let mut limits = integrator.limits();
+    limits.retain(|limit| limit.concerns(scene));
     // What the surfaces' models leave out matters where they are asked.
     if integrator.scatters() {
         limits.extend(scene.truncations().iter().cloned().map(Limit::Truncation));
@@ -256,7 +265,7 @@ fn estimate_label(integrator: &dyn Integrator, scene: &Scene) -> String {
         (!list.is_empty()).then(|| format!("{word}: {}", list.join(", ")))
     };
     let groups = [
-        group("truncated", &|l| matches!(l, Limit::MaxDepth(_) | Limit::Truncation(_))),
+        group("truncated", &|l| matches!(l, Limit::MaxDepth(_) | Limit::Truncation(_) | Limit::Unfound(..))),
         group("biased", &|l| matches!(l, Limit::Bias(_))),
         group("estimates", &|l| matches!(l, Limit::OtherQuantity(_))),
     ];

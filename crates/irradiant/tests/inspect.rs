@@ -178,7 +178,7 @@ fn what_lamps_emit_is_absorbed_or_escapes() {
         "{books:?}"
     );
     let of =
-        |name: &str| books.by_material.iter().find(|(id, _)| job.scene.material_name(*id) == name).map(|(_, p)| *p);
+        |name: &str| books.by_material.iter().find(|m| job.scene.material_name(m.material) == name).map(|m| m.absorbed);
     let glass = of("glass").expect("light meets the glass");
     assert!(glass.watts.abs() < 4.9 * glass.error + 1e-4 * total, "glass absorbs {glass:?} of {total}");
     assert!(of("white").expect("walls").watts > 0.1 * total, "{books:?}");
@@ -195,6 +195,39 @@ fn what_lamps_emit_is_absorbed_or_escapes() {
     let other = audit(&open.scene, &AuditSettings { seed: 6, ..settings }).expect("lights");
     assert_eq!(again.absorbed, books.absorbed);
     assert_ne!(other.absorbed, books.absorbed);
+}
+
+/// B08 in a box of narrow lobes: steel of alpha 0.001 on the walls (coffee's floor has a coat like that), rough glass. 30,000 particles; 3 % gone
+/// astray would be seen. With a rough coat of pbrt-v4's weights on the floor, brighter when evaluated by 1 to 2 %, the books say where
+/// they do not balance, and that they do elsewhere.
+#[test]
+fn narrow_lobes_raise_no_false_alarm_and_pbrts_weights_are_named() {
+    let narrow = BOX
+        .replace(
+            "\"conductor\" \"float roughness\" 0.5",
+            "\"conductor\" \"float roughness\" 0.001 \"bool remaproughness\" false",
+        )
+        .replace(
+            "\"float roughness\" 0 \"integer maxdepth\" 0",
+            "\"float roughness\" 0.001 \"bool remaproughness\" false \"integer maxdepth\" 0",
+        )
+        .replace("\"dielectric\" \"float eta\" 1.5", "\"dielectric\" \"float eta\" 1.5 \"float roughness\" 0.01");
+    let settings = AuditSettings { paths: 30_000, max_depth: None, seed: 5 };
+    let (job, _) = job(&narrow);
+    let books = audit(&job.scene, &settings).expect("lights");
+    let total = books.emitted.watts;
+    assert!(books.z().abs() < 4.9, "{books:?}");
+    assert!(6.9 * books.missing.error < 0.03 * total, "{books:?} could hide a loss");
+    assert_eq!(books.missing, books.missing_elsewhere);
+    assert!(books.by_material.iter().all(|m| m.missing.z().abs() < 4.9 && !m.evaluated_as_pbrt), "{books:?}");
+
+    let coat = "\"coateddiffuse\" \"rgb reflectance\" [ .9 .9 .9 ] \"float roughness\" 0.3";
+    let (job, _) = self::job(&narrow.replace("\"diffuse\" \"rgb reflectance\" [ .8 .7 .6 ]", coat));
+    let books = audit(&job.scene, &settings).expect("lights");
+    assert!(books.missing.z() > 6.0, "pbrt-v4's weights are not seen: {books:?}");
+    assert!(books.z().abs() < 4.9, "{books:?}");
+    let named: Vec<_> = books.by_material.iter().filter(|m| m.evaluated_as_pbrt).collect();
+    assert!(named.len() == 1 && job.scene.material_name(named[0].material) == "white", "{books:?}");
 }
 
 /// B09. A matt ceiling, steel, lacquer and glass: what arrives, integrated, is what the path tracer says leaves. A bias of a third

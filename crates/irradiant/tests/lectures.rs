@@ -195,6 +195,45 @@ fn all_ways_to_sample_direct_light_agree() {
 }
 
 #[test]
+fn labels_name_only_what_the_scene_can_lose() {
+    let lamp = "AttributeBegin\nAreaLightSource \"diffuse\"\nShape \"sphere\"\nAttributeEnd\n";
+    let point = "LightSource \"point\"\n";
+    let glass = "Material \"dielectric\"\nShape \"sphere\"\n";
+    let hair = "AttributeBegin\nAreaLightSource \"diffuse\"\nShape \"curve\" \"point3 P\" [ 0 0 0  1 0 0  2 0 0  3 0 0 ]\nAttributeEnd\n";
+    let (mirrors, eye) = ("lamps seen by mirrors and glass", "lamps that the eye sees");
+    for (words, lost, by) in [
+        ("try1", "delta lights", point),
+        ("try2", "delta lights", point),
+        ("distribution", "delta lights", point),
+        ("randomwalk", "delta lights", point),
+        ("randomwalk", "delta lobes", glass),
+        ("simplepath samplelights=false", "delta lights", point),
+        ("simplepath samplebsdf=false", "delta lobes", glass),
+        ("lighttrace", "by way of delta lobes", glass),
+        ("lighttrace", "lamps that are curves", hair),
+        ("photon", "lamps that are curves", hair),
+        ("direct", mirrors, glass),
+        ("direct", mirrors, hair),
+        ("partitioned", mirrors, glass),
+        ("iterative", eye, lamp),
+        ("partitioned shadow=anything", "stand in front", lamp),
+    ] {
+        let label = |world: &str| {
+            let text = film(4) + "Camera \"perspective\"\nWorldBegin\nMaterial \"diffuse\"\nShape \"sphere\"\n" + world;
+            let file = load_text("test", &text, ".").unwrap_or_else(|e| panic!("{e}"));
+            let settings = RenderSettings { integrator: Some(choice(words)), ..RenderSettings::default() };
+            Job::new(&file, &settings).unwrap_or_else(|e| panic!("{e}")).header.estimate
+        };
+        // What it is lost by, and all but that.
+        let all = lamp.to_owned() + point + glass;
+        let without = if by == hair { lamp.into() } else { all.replace(by, if by == lamp { "" } else { lamp }) };
+        let with = if by == hair { hair.to_owned() } else { all };
+        assert!(label(&with).contains(lost), "{words}: {}", label(&with));
+        assert!(!label(&without).contains(lost), "{words}: {}", label(&without));
+    }
+}
+
+#[test]
 fn chance_never_meets_a_point_light_and_a_sample_of_it_is_enough() {
     let scene = film(8)
         + "LookAt 0 3 0.01  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 20\nWorldBegin\nLightSource \"point\" \"point3 from\" [ 1 1 0 ]\n"

@@ -104,5 +104,6 @@ fn story(job: &Job, s: &PathStory, bounces: Option<&RangeInclusive<u32>>) -> Val
         "end": end_in_words(s.end),
         "radiance": spectrum(s.radiance),
         "film": s.rgb,
+        "film_from_radiance": s.film_from_radiance.map(spectrum),
     })
 }

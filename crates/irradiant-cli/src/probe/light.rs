@@ -90,10 +90,25 @@ pub fn incident(
 }
 
 /// `--residual`
-pub fn residual(job: &Job, integrator: &PathIntegrator, name: &str, points: u32, samples: u32, as_json: bool) {
+pub fn residual(
+    job: &Job,
+    integrator: &PathIntegrator,
+    name: &str,
+    points: u32,
+    samples: u32,
+    as_json: bool,
+) -> Result<(), Error> {
     let scene = &job.scene;
     let found = residuals(scene, integrator, points, samples, scene.seed);
+    if found.is_empty() {
+        return Err(Error::Settings(format!(
+            "--residual {points}: none of {points} rays from the camera met a surface, so nothing was tested; try more points, or a \
+             scene or camera that sees one"
+        )));
+    }
     let (mean, error) = mean_residual(&found);
+    // Without light both sides are 0, and a share of nothing is no number.
+    let lit = found.iter().any(|r| r.left.rgb[1] > 0.0 || r.right.rgb[1] > 0.0);
     let world = scene.world_from_render();
     if as_json {
         let rows: Vec<Value> = found
@@ -109,9 +124,10 @@ pub fn residual(job: &Job, integrator: &PathIntegrator, name: &str, points: u32,
                 })
             })
             .collect();
-        let value = json!({ "scene": name, "points": rows, "relative_residual": mean, "error": error });
+        let share = |x: f64| lit.then_some(x);
+        let value = json!({ "scene": name, "points": rows, "relative_residual": share(mean), "error": share(error) });
         println!("{}", serde_json::to_string_pretty(&value).unwrap_or_default());
-        return;
+        return Ok(());
     }
     println!(
         "{name}: Lo against Le + integral of f L cos, at {} points of {points} tried, {samples} paths a side",
@@ -133,10 +149,15 @@ pub fn residual(job: &Job, integrator: &PathIntegrator, name: &str, points: u32,
             r.left.z(&r.right)[1]
         );
     }
+    if !lit {
+        println!("residual     none: no light was found at any of these points");
+        return Ok(());
+    }
     println!(
         "residual {:+.3} % of the mean radiance, standard error {:.3} % (a bias of {:.2} % would be seen)",
         100.0 * mean,
         100.0 * error,
         100.0 * 4.0 * error
     );
+    Ok(())
 }

@@ -99,8 +99,7 @@ fn probe(arguments: &ProbeArguments) -> Result<(), Error> {
     let scene = &job.scene;
     let integrator = path_integrator(&job)?;
     if let Some(points) = arguments.residual {
-        light::residual(&job, &integrator, &file.name, points, arguments.rays.unwrap_or(4096), arguments.json);
-        return Ok(());
+        return light::residual(&job, &integrator, &file.name, points, arguments.rays.unwrap_or(4096), arguments.json);
     }
     // One of the two is there: clap sees to it.
     let Some(Pixel(pixel)) = arguments.pixel else { return Ok(()) };

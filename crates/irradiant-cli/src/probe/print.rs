@@ -5,6 +5,7 @@ use irradiant::drawing::end_in_words;
 use irradiant::math::Vec3;
 use irradiant::renderer::inspect::PathStory;
 use irradiant::renderer::inspect::story::{Found, LightOutcome};
+use irradiant::renderer::path::{Roulette, SURVIVAL_RULE};
 use irradiant::renderer::record::Technique;
 use irradiant::spectrum::SampledSpectrum;
 use std::ops::RangeInclusive;
@@ -86,14 +87,39 @@ fn one(job: &Job, story: &PathStory, bounces: Option<&RangeInclusive<u32>>) {
         light_from(story.vertices.len() as u32).filter(met).for_each(light);
     }
     println!("end          {}", end_in_words(story.end));
+    if story.vertices.iter().any(|v| v.step.is_some()) {
+        println!("             survival: {}", survival_in_words(job));
+    }
+    if let Some(range) = bounces.filter(|range| !story.found.iter().any(|f| range.contains(&f.contribution.bounces))) {
+        println!("             no light after {} bounces was found", bounces_in_words(range));
+    }
     println!("radiance     {}  W m^-2 sr^-1 nm^-1", spectrum(story.radiance));
     if story.secondary_ended {
         println!("             dispersion ended all wavelengths but the first");
+    }
+    for (channel, of) in ["R", "G", "B"].iter().zip(&story.film_from_radiance) {
+        println!("             film {channel} is the sum of radiance x {}", spectrum(*of));
     }
     let rgb = story.rgb;
     println!("film         R {:.6e}  G {:.6e}  B {:.6e}", rgb[0], rgb[1], rgb[2]);
     if !rgb.iter().all(|c| c.is_finite()) {
         println!("             NOT FINITE: this sample is refused by the film");
+    }
+}
+
+/// The chance to survive a scattering event, by the integrator's roulette.
+fn survival_in_words(job: &Job) -> String {
+    match job.path_integrator().map(|path| path.roulette) {
+        Some(Roulette::Constant(q)) => format!("{} at each event", 1.0 - q),
+        Some(Roulette::Throughput) | None => SURVIVAL_RULE.into(),
+    }
+}
+
+fn bounces_in_words(range: &RangeInclusive<u32>) -> String {
+    if range.start() == range.end() {
+        range.start().to_string()
+    } else {
+        format!("{} to {}", range.start(), range.end())
     }
 }
 
@@ -129,6 +155,7 @@ fn many(stories: &[PathStory], bounces: Option<&RangeInclusive<u32>>) {
         "{:>7} {:>8}  {:<17} {:>12} {:>12} {:>12}  light after bounces",
         "sample", "vertices", "end", "R", "G", "B"
     );
+    let mut shown = 0;
     for s in stories {
         let found: Vec<String> = s
             .found
@@ -139,6 +166,7 @@ fn many(stories: &[PathStory], bounces: Option<&RangeInclusive<u32>>) {
         if bounces.is_some() && found.is_empty() {
             continue;
         }
+        shown += 1;
         println!(
             "{:>7} {:>8}  {:<17} {:>12.4e} {:>12.4e} {:>12.4e}  {}",
             s.sample,
@@ -149,5 +177,8 @@ fn many(stories: &[PathStory], bounces: Option<&RangeInclusive<u32>>) {
             s.rgb[2],
             found.join("  ")
         );
+    }
+    if let (0, Some(range)) = (shown, bounces) {
+        println!("none of these {} samples found light after {} bounces", stories.len(), bounces_in_words(range));
     }
 }

@@ -5,8 +5,9 @@
 
 use super::coat::CoatForm;
 use super::coated::{CoatOverMirror, CoatedDiffuse};
+use super::fresnel::{fresnel_dielectric, refract};
 use super::microfacet::Ggx;
-use super::{Bxdf, fresnel::fresnel_dielectric};
+use super::{Bxdf, CoatWeights};
 use irradiant_math::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -50,6 +51,47 @@ impl Bxdf {
                 }
             }
             Self::ThinFilmPaint(b) => b.coat().map_or(Spread::of(b.facets()), |coat| coat.spread(b.facets())),
+        }
+    }
+
+    /// Where the lobes of light from `wo` that may be narrow have their peaks, whatever their width: the mirror direction, the
+    /// refracted one, the way back. Unit, local frame. None of models that scatter broadly only.
+    ///
+    /// At grazing angles a rough lobe's maximum lies off these directions; they are where to look, not where it is.
+    pub fn peaks(&self, wo: Vec3) -> [Option<Vec3>; 2] {
+        let mirror = Some(Vec3::new(-wo.x, -wo.y, wo.z));
+        match self {
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) => [None, None],
+            // All that a smooth coat adds is a delta.
+            Self::CoatedDiffuse(b) if b.coat().interface.is_specular() => [None, None],
+            Self::Conductor(_)
+            | Self::CoatedDiffuse(_)
+            | Self::CoatedConductor(_)
+            | Self::GlossyPaint(_)
+            | Self::ThinFilmPaint(_) => [mirror, None],
+            Self::Dielectric(b) => [mirror, refract(wo, Vec3::Z, b.eta()).map(|(wi, _)| wi)],
+            Self::ThinDielectric(_) => [mirror, Some(-wo)],
+            Self::Retroreflective(_) => [Some(wo), None],
+        }
+    }
+
+    /// Whether evaluation is brighter than sampling, as pbrt-v4's is ([`CoatWeights::Pbrt`]): rough coats over anything but a mirror.
+    pub fn is_evaluated_as_pbrt(&self) -> bool {
+        match self {
+            Self::CoatedDiffuse(b) => b.coat().has_pbrt_weights(),
+            Self::CoatedConductor(b) => {
+                let coat = b.coat();
+                let mirror = b.facets().is_smooth() && coat.filling.albedo.is_black();
+                coat.weights == CoatWeights::Pbrt && !coat.interface.is_specular() && !mirror
+            }
+            Self::Diffuse(_)
+            | Self::DiffuseTransmission(_)
+            | Self::Conductor(_)
+            | Self::Dielectric(_)
+            | Self::ThinDielectric(_)
+            | Self::Retroreflective(_)
+            | Self::GlossyPaint(_)
+            | Self::ThinFilmPaint(_) => false,
         }
     }
 }

@@ -52,6 +52,14 @@ impl Facets {
         matches!(self, Self::Varying { .. })
     }
 
+    /// Whether they may be smooth somewhere: textures may say so.
+    fn may_be_smooth(&self) -> bool {
+        match self {
+            Self::Constant(ggx) => ggx.is_smooth(),
+            Self::Varying { .. } => true,
+        }
+    }
+
     #[inline]
     fn at(&self, textures: &Textures, tex: &TextureContext) -> Ggx {
         match *self {
@@ -305,6 +313,23 @@ impl Material {
             }
         }
     }
+
+    /// Whether it may scatter into single directions; mixes themselves do not, what they mix may.
+    fn may_be_specular(&self) -> bool {
+        // Nothing refracts at an index of 1; dispersive ones are never 1 throughout.
+        let interface = |eta: &Index, facets: &Facets| facets.may_be_smooth() || *eta == Index::Constant(1.0);
+        match self {
+            Self::Diffuse { .. } | Self::DiffuseTransmission { .. } | Self::Mix { .. } | Self::Interface => false,
+            // Smooth facets are given a width.
+            Self::Retroreflective { .. } => false,
+            Self::ThinDielectric { .. } => true,
+            Self::Conductor { facets, .. } | Self::GlossyPaint { facets, .. } | Self::ThinFilmPaint { facets, .. } => {
+                facets.may_be_smooth()
+            }
+            Self::Dielectric { eta, facets } => interface(eta, facets),
+            Self::CoatedDiffuse { coat, .. } | Self::CoatedConductor { coat, .. } => interface(&coat.eta, &coat.facets),
+        }
+    }
 }
 
 /// A range of tabulated coats, by roughness.
@@ -357,6 +382,11 @@ impl Materials {
     #[inline]
     pub fn may_pass(&self) -> bool {
         self.may_pass
+    }
+
+    /// Whether any material may scatter into single directions (a delta), for all that is known without looking textures up.
+    pub fn may_be_specular(&self) -> bool {
+        !self.force_diffuse && self.entries.iter().any(|entry| entry.material.may_be_specular())
     }
 
     /// Whether a material looks anything up in textures, so that it needs to know how large a pixel is where it is met.

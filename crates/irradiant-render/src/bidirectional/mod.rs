@@ -92,8 +92,13 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
         },
     ],
     make: |options, max_depth| {
-        let strategy = Strategy { light: options.count("s"), camera: options.count("t") };
-        let shown = (strategy.camera > 0).then_some(Shown { strategy, weighted: options.flag("weighted") });
+        // Without t there is nothing to show alone: `check` tells whoever asks for it.
+        let shown = Shown {
+            strategy: Strategy { light: options.count("s"), camera: options.count("t") },
+            weighted: options.flag("weighted"),
+        };
+        let all = Shown { strategy: Strategy { light: 0, camera: 0 }, weighted: true };
+        let shown = (shown != all).then_some(shown);
         Box::new(BidirectionalIntegrator { max_depth, heuristic: Heuristic::of(options.word("heuristic")), shown })
     },
 };
@@ -115,6 +120,33 @@ impl Integrator for BidirectionalIntegrator {
 
     fn splats(&self) -> bool {
         true
+    }
+
+    fn check(&self, _scene: &Scene) -> Result<(), String> {
+        let Some(Shown { strategy: Strategy { light: s, camera: t }, weighted }) = self.shown else { return Ok(()) };
+        let vertices = s.saturating_add(t);
+        let asked = format!("bdpt: s={s} and t={t} (vertices from the light's and from the camera's walk)");
+        if t == 0 {
+            return Err(match (s, weighted) {
+                (0, _) => {
+                    "bdpt: weighted=false shows one strategy alone; say which, e.g. s=1 and t=2, or leave it out".into()
+                }
+                (1, _) => "bdpt: s=1 needs t, the vertices from the camera's walk; try t=2".into(),
+                _ => format!("bdpt: s={s} needs t, the vertices from the camera's walk; try t=1 or t=2"),
+            });
+        }
+        if vertices < 2 || (s, t) == (1, 1) {
+            return Err(format!("{asked} is no strategy: lamps that the eye sees are found by s=0 and t=2 only"));
+        }
+        if let Some(limit) = self.max_depth.filter(|&limit| vertices - 2 > limit) {
+            return Err(format!(
+                "{asked} make paths of {} scattering events, and maxdepth is {limit}: nothing would be shown; try \
+                 --max-depth {} or none, or smaller numbers",
+                vertices - 2,
+                vertices - 2
+            ));
+        }
+        Ok(())
     }
 
     fn limits(&self) -> Vec<Limit> {

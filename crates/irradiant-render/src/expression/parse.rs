@@ -10,6 +10,8 @@ const DEEPEST: usize = 50;
 
 const ALL_CLASSES: u8 = 0b1111;
 const BOTH_SIDES: u8 = 0b11;
+/// What a repetition begins with.
+const REPETITIONS: &str = "*+?{";
 const LETTERS: &str = "lights are L (any) and B (an environment), events are D, G, S, V and . (any), the eye is E";
 
 impl PathExpression {
@@ -38,6 +40,11 @@ impl PathExpression {
 }
 
 impl Node {
+    /// Nothing was written.
+    fn is_nothing(&self) -> bool {
+        matches!(self, Self::Sequence(nodes) if nodes.is_empty())
+    }
+
     /// Number of letters when repetitions are written out; saturates.
     fn size(&self) -> u64 {
         match self {
@@ -100,7 +107,12 @@ impl Parser<'_> {
     fn either(&mut self) -> Parsed<Node> {
         let mut nodes = vec![self.sequence()?];
         while self.take('|') {
+            let bar = self.at - 1;
             nodes.push(self.sequence()?);
+            if nodes[nodes.len() - 2..].iter().any(Node::is_nothing) {
+                let help = "write both sides, (D|S); for \"D or nothing\" write D?";
+                return Err(self.error(bar, 1, "nothing stands on one side of this \"|\"", help));
+            }
         }
         Ok(if nodes.len() == 1 { nodes.remove(0) } else { Node::Either(nodes) })
     }
@@ -130,6 +142,10 @@ impl Parser<'_> {
                 if !self.take(')') {
                     return Err(self.error(start, 1, "this \"(\" is not closed", "add \")\""));
                 }
+                if node.is_nothing() {
+                    let help = "write events there, or leave the parentheses out";
+                    return Err(self.error(start, self.at - start, "nothing is in these parentheses", help));
+                }
                 self.depth -= 1;
                 Ok(node)
             }
@@ -145,7 +161,7 @@ impl Parser<'_> {
                 self.at += 1;
                 Ok(Node::Letter(Letter::Light { environment_only: c == 'B', label: self.label()? }))
             }
-            '*' | '+' | '?' | '{' => Err(self.error(
+            c if REPETITIONS.contains(c) => Err(self.error(
                 start,
                 1,
                 format!("nothing to repeat before \"{c}\""),
@@ -261,29 +277,38 @@ impl Parser<'_> {
         Ok(Some(Label { pattern: self.characters[at + 1..=at + length].iter().collect(), at }))
     }
 
-    fn repeated(&mut self, mut node: Node) -> Parsed<Node> {
-        while let Some(c) = self.peek() {
-            let (least, most) = match c {
-                '*' => (0, None),
-                '+' => (1, None),
-                '?' => (0, Some(1)),
-                '{' => {
-                    let (least, most) = self.counts()?;
-                    node = Node::Repeat { node: Box::new(node), least, most };
-                    continue;
-                }
-                _ => break,
-            };
-            self.at += 1;
-            node = match node {
-                // x** and x+* are x*, x++ is x+.
-                Node::Repeat { node, least: inner @ (0 | 1), most: None } if most.is_none() => {
-                    Node::Repeat { node, least: least * inner, most: None }
-                }
-                node => Node::Repeat { node: Box::new(node), least, most },
-            };
+    fn repeated(&mut self, node: Node) -> Parsed<Node> {
+        let Some((least, most)) = self.repetition(&node)? else { return Ok(node) };
+        let first = self.at - 1;
+        let node = Node::Repeat { node: Box::new(node), least, most };
+        // Whoever writes L.** means something else than L.*, and x{2}* may be read in two ways.
+        if let Some(c) = self.peek().filter(|c| REPETITIONS.contains(*c)) {
+            let before = self.characters[first];
+            let message = format!("\"{c}\" repeats what \"{before}\" repeats already");
+            let help =
+                "one repetition is enough: x* is any number, x+ at least one; repeat groups with parentheses, (x{2})*";
+            return Err(self.error(self.at, 1, message, help));
         }
         Ok(node)
+    }
+
+    /// A repetition of what stands before, if there is one here: least and most.
+    fn repetition(&mut self, of: &Node) -> Parsed<Option<(u32, Option<u32>)>> {
+        let Some(c) = self.peek().filter(|c| REPETITIONS.contains(*c)) else { return Ok(None) };
+        // "L*E" is how a file name would be written.
+        if let Node::Letter(Letter::Light { .. } | Letter::Eye) = of {
+            let message = format!("\"{c}\" repeats the letter before it, and a path has one light and one eye");
+            return Err(self.error(self.at, 1, message, "for any events in between write L.*E, for at least one L.+E"));
+        }
+        if c == '{' {
+            return self.counts().map(Some);
+        }
+        self.at += 1;
+        Ok(Some(match c {
+            '*' => (0, None),
+            '+' => (1, None),
+            _ => (0, Some(1)),
+        }))
     }
 
     /// `{2}`, `{2,}`, `{2,5}`.

@@ -303,7 +303,7 @@ impl<'a> SurfacePoint<'a> {
     }
 
     /// Scattered light of lights that no direction finds.
-    fn from_delta_lights(&self, bsdf: &Bsdf, u: Point2, lambda: &Wavelengths) -> SampledSpectrum {
+    fn by_delta_lights(&self, bsdf: &Bsdf, u: Point2, lambda: &Wavelengths) -> SampledSpectrum {
         if self.integrator.max_depth == Some(0) {
             return SampledSpectrum::ZERO;
         }
@@ -324,7 +324,7 @@ impl<'a> SurfacePoint<'a> {
         let Some(bsdf) = self.bsdf(lambda, stream) else { return SampledSpectrum::ZERO };
         let [u, v, lobe, _] = stream.block(BEYOND);
         let [a, b, _, _] = stream.block(BEYOND + 1);
-        let mut sum = self.from_delta_lights(&bsdf, Point2::new(a, b), lambda);
+        let mut sum = self.by_delta_lights(&bsdf, Point2::new(a, b), lambda);
         if let Some(s) = bsdf.sample(self.at.wo, lobe, Point2::new(u, v), TransportMode::Radiance, Sides::All) {
             sum += s.f * (bsdf.abs_cos(s.wi) / s.pdf) * self.arriving(s.wi, stream, lambda);
         }
@@ -336,7 +336,7 @@ impl<'a> SurfacePoint<'a> {
         let Some(bsdf) = self.bsdf(lambda, stream) else { return SampledSpectrum::ZERO };
         let [u, v, lobe, _] = stream.block(BEYOND);
         let [a, b, c, d] = stream.block(BEYOND + 1);
-        let mut sum = self.from_delta_lights(&bsdf, Point2::new(a, b), lambda);
+        let mut sum = self.by_delta_lights(&bsdf, Point2::new(a, b), lambda);
         if bsdf.flags().is_specular()
             && let Some(s) = bsdf.sample(self.at.wo, lobe, Point2::new(u, v), TransportMode::Radiance, Sides::All)
             && s.lobe.is_specular()

@@ -129,6 +129,9 @@ pub struct PathStory {
     pub radiance: SampledSpectrum,
     /// What the film was given.
     pub rgb: [f32; 3],
+    /// What the film's red, green and blue are of each wavelength's radiance: sensor, wavelengths' densities, the camera's and the pixel
+    /// filter's weights, and what the scene's `maxcomponentvalue` leaves. `rgb` is the sum of radiance times these.
+    pub film_from_radiance: [SampledSpectrum; 3],
 }
 
 impl PathStory {
@@ -156,6 +159,13 @@ pub fn replay(scene: &Scene, integrator: &PathIntegrator, pixel: [i32; 2], sampl
     let radiance =
         integrator.radiance(scene, &camera_ray, &drawn.stream, &mut lambda, &mut [], &mut stats, &mut recorder);
     let rgb = scene.film_rgb(radiance * camera_ray.weight, &lambda).map(|c| c * drawn.filter_weight);
+    let limit = scene.limit_factor(radiance * camera_ray.weight, &lambda);
+    let weight = camera_ray.weight * drawn.filter_weight * limit;
+    let of_lane: [[f32; 3]; 4] = std::array::from_fn(|i| {
+        let lane = SampledSpectrum::from_fn(|j| if i == j { weight } else { 0.0 });
+        scene.film_rgb_of_part(lane, &lambda)
+    });
+    let film_from_radiance = std::array::from_fn(|c| SampledSpectrum::from_fn(|i| of_lane[i][c]));
     let mut story = PathStory {
         pixel,
         sample,
@@ -168,6 +178,7 @@ pub fn replay(scene: &Scene, integrator: &PathIntegrator, pixel: [i32; 2], sampl
         end: recorder.end.unwrap_or(PathEnd::Absorbed),
         radiance,
         rgb,
+        film_from_radiance,
     };
     let mut bookkeeper =
         Bookkeeper { scene, camera_ray: &camera_ray, stream: &drawn.stream, value: [1.0; 4], density: 1.0 };
@@ -241,7 +252,7 @@ impl Bookkeeper<'_> {
                 bsdf.regularize();
             }
             let scattering = recorder.scatterings.get(depth as usize);
-            let asks = bsdf.flags().is_non_specular() && !integrator.max_depth.is_some_and(|limit| depth >= limit);
+            let asks = bsdf.flags().is_non_specular() && integrator.max_depth.is_none_or(|limit| depth < limit);
             if asks {
                 let c = found(Technique::LightSample, depth + 1).next();
                 story.vertices[depth as usize].light = self.light(&at, &bsdf, &lambda, depth, c, story);

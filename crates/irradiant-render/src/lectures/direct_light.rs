@@ -12,7 +12,7 @@
 
 use super::emission::EmissionRule;
 use super::walk::{Vertex, Walk};
-use crate::integrator::Limit;
+use crate::integrator::{Limit, SceneHas};
 use crate::registry::{OptionEntry, OptionRange, Options, words};
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::interaction::{LightId, ReferencePoint};
@@ -203,9 +203,10 @@ impl DirectLight {
         match self.shadow {
             Shadow::Segment => None,
             Shadow::FirstHit => Some(Limit::Bias("shadow rays end at the first emitter".into())),
-            Shadow::Anything => {
-                Some(Limit::Truncation("lights that stand in front of something or of themselves".into()))
-            }
+            Shadow::Anything => Some(Limit::Unfound(
+                "lights that stand in front of something or of themselves",
+                &[SceneHas::AreaLights],
+            )),
         }
     }
 }

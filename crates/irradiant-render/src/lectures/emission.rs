@@ -12,7 +12,7 @@
 
 use super::direct_light::DirectLight;
 use super::walk::Met;
-use crate::integrator::Limit;
+use crate::integrator::{Limit, SceneHas};
 use crate::path::power_heuristic;
 use crate::registry::{OptionEntry, OptionRange, words};
 use irradiant_core::interaction::ReferencePoint;
@@ -109,8 +109,13 @@ impl EmissionRule {
     /// What it does to the picture.
     pub fn limit(self) -> Option<Limit> {
         match self {
-            Self::Never => Some(Limit::Truncation("lamps that the eye sees, directly or by mirrors and glass".into())),
-            Self::Eye => Some(Limit::Truncation("lamps seen by mirrors and glass, and their caustics".into())),
+            Self::Never => {
+                Some(Limit::Unfound("lamps that the eye sees, directly or by mirrors and glass", &[SceneHas::Lamps]))
+            }
+            Self::Eye => Some(Limit::Unfound(
+                "lamps seen by mirrors and glass, and their caustics",
+                &[SceneHas::Lamps, SceneHas::UnsampledWays],
+            )),
             Self::Always => Some(Limit::Bias("lamps met by chance count beside light samples".into())),
             Self::Specular | Self::Balance | Self::Power => None,
         }

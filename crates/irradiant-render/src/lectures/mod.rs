@@ -33,7 +33,7 @@ pub mod roulette;
 pub mod tries;
 pub mod walk;
 
-use crate::integrator::Limit;
+use crate::integrator::{Limit, SceneHas};
 use crate::registry::{OptionEntry, OptionRange, Value};
 
 /// The option of estimators that take several light samples at a vertex.
@@ -51,5 +51,5 @@ fn depth_limit(max_depth: Option<u32>) -> impl Iterator<Item = Limit> {
 
 /// What estimators leave out that find light only by chance.
 fn unsampled_lights() -> Limit {
-    Limit::Truncation("delta lights".into())
+    Limit::Unfound("delta lights", &[SceneHas::DeltaLights])
 }

@@ -21,7 +21,7 @@ pub mod map;
 mod passes;
 
 use crate::camera_samples::{CameraSample, for_each_sample};
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};
 use crate::light_walk::{shading_correction, start, survival, walk};
 use crate::path::power_heuristic;
 use crate::registry::{IntegratorEntry, OptionEntry, OptionRange, Value};
@@ -150,7 +150,8 @@ impl Integrator for PhotonIntegrator {
         let radius = self.decided.get().map(|d| d.radius).or(self.settings.radius);
         let radius = radius.map_or("of two pixels".into(), |r| r.to_string());
         let bias = format!("photon radius {radius} at first, alpha {}", self.settings.alpha);
-        depth.into_iter().chain([Limit::Bias(bias)]).collect()
+        let curves = Limit::Unfound("photons of lamps that are curves", &[SceneHas::CurvedLamps]);
+        depth.into_iter().chain([curves, Limit::Bias(bias)]).collect()
     }
 }
 

@@ -81,9 +81,9 @@ fn measures(outcome: &Outcome) -> String {
         if n <= 4 || failed > 0 { " open" } else { "" }
     );
     for m in &outcome.measures {
-        let _ = write!(
+        let _ = writeln!(
             html,
-            "<div class=\"measure{}\"><div class=\"what\">{}</div><dl><dt>measured</dt><dd>{}</dd><dt>bound</dt><dd>{}</dd><dt>would see</dt><dd>{}</dd></dl></div>\n",
+            "<div class=\"measure{}\"><div class=\"what\">{}</div><dl><dt>measured</dt><dd>{}</dd><dt>bound</dt><dd>{}</dd><dt>would see</dt><dd>{}</dd></dl></div>",
             if m.passes { "" } else { " out" },
             escaped(&m.what),
             escaped(&m.value),
@@ -102,14 +102,14 @@ fn row(told: &Told, here: &Here) -> String {
         row.id,
         escaped(row.name)
     );
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<p><b class=\"kind\">Slide</b> {}</p><p><b class=\"kind\">Check</b> {}</p>\n",
+        "<p><b class=\"kind\">Slide</b> {}</p><p><b class=\"kind\">Check</b> {}</p>",
         if row.says == "-" { "(a figure)".into() } else { escaped(row.says) },
         escaped(row.check)
     );
     if let Verdict::Fails(why) | Verdict::Waits(why) = &outcome.verdict {
-        let _ = write!(html, "<p class=\"why\">{}</p>\n", escaped(why));
+        let _ = writeln!(html, "<p class=\"why\">{}</p>", escaped(why));
     }
     if !outcome.pictures.is_empty() {
         html += "<div class=\"pictures\">";
@@ -118,11 +118,11 @@ fn row(told: &Told, here: &Here) -> String {
     }
     html += &measures(outcome);
     for note in &outcome.notes {
-        let _ = write!(html, "<p class=\"note\">{}</p>\n", linked(note, here));
+        let _ = writeln!(html, "<p class=\"note\">{}</p>", linked(note, here));
     }
     if !outcome.commands.is_empty() {
         let lines: Vec<String> = outcome.commands.iter().map(|c| escaped(c)).collect();
-        let _ = write!(html, "<pre>{}</pre>\n", lines.join("\n"));
+        let _ = writeln!(html, "<pre>{}</pre>", lines.join("\n"));
     }
     html + "</article>\n"
 }
@@ -160,7 +160,7 @@ fn lecture(lesson: &Lesson, letter: char, title: &str, intro: &str) -> String {
         if own.map(|c| c.0) != chapter {
             chapter = own.map(|c| c.0);
             if let Some((_, name)) = own {
-                let _ = write!(html, "<h4 class=\"chapter\">{name}</h4>\n");
+                let _ = writeln!(html, "<h4 class=\"chapter\">{name}</h4>");
             }
         }
         html += &row(t, &here);
@@ -176,26 +176,26 @@ pub fn page(lesson: &Lesson) -> String {
     let (fails, waits) = (count("fails"), count("waits"));
     let measures: usize = lesson.told.iter().map(|t| t.outcome.measures.len()).sum();
     let mut html = String::with_capacity(1 << 22);
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>Irradiant: {passed} of {n} rows pass</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}</style>\n</head>\n<body>\n",
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>Irradiant: {passed} of {n} rows pass</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}</style>\n</head>\n<body>",
         include_str!("page.css")
     );
     let budget = match lesson.budget {
         crate::Budget::Quick => "quick",
         crate::Budget::Full => "full",
     };
-    let _ = write!(
+    let _ = writeln!(
         html,
-        "<div class=\"top\"><h1>Two lectures, executable</h1>\n<p class=\"lead\">What two lectures on global illumination say, claim by claim, and what Irradiant {} measures of it. A row passes only through a measurement that could have failed.</p>\n<p class=\"score\"><strong>{passed}</strong> of {n} rows pass</p>\n<div class=\"bar\" role=\"img\" aria-label=\"{passed} pass, {fails} fail, {waits} wait\"><i class=\"passes\" style=\"flex:{passed}\"></i><i class=\"fails\" style=\"flex:{fails}\"></i><i class=\"waits\" style=\"flex:{waits}\"></i></div>\n<p class=\"facts\">{measures} measures, {fails} rows fail, {waits} wait \u{b7} {budget} budget, seed {}, {:.0} s</p>\n",
+        "<div class=\"top\"><h1>Two lectures, executable</h1>\n<p class=\"lead\">What two lectures on global illumination say, claim by claim, and what Irradiant {} measures of it. A row passes only through a measurement that could have failed.</p>\n<p class=\"score\"><strong>{passed}</strong> of {n} rows pass</p>\n<div class=\"bar\" role=\"img\" aria-label=\"{passed} pass, {fails} fail, {waits} wait\"><i class=\"passes\" style=\"flex:{passed}\"></i><i class=\"fails\" style=\"flex:{fails}\"></i><i class=\"waits\" style=\"flex:{waits}\"></i></div>\n<p class=\"facts\">{measures} measures, {fails} rows fail, {waits} wait \u{b7} {budget} budget, seed {}, {:.0} s</p>",
         irradiant::VERSION,
         lesson.seed,
         lesson.seconds
     );
     if let Some(fault) = &lesson.fault {
-        let _ = write!(
+        let _ = writeln!(
             html,
-            "<p class=\"why\">With a fault on purpose ({}): {}. Row {} must fail.</p>\n",
+            "<p class=\"why\">With a fault on purpose ({}): {}. Row {} must fail.</p>",
             fault.name,
             escaped(fault.what),
             fault.row

@@ -24,6 +24,8 @@ const PANEL: &str = "#171a21";
 const EDGE: &str = "#2a2f3a";
 const WORDS: &str = "#e6e8ee";
 const QUIET: &str = "#9aa3b2";
+/// Around places of lamps that light came from.
+const LAMP_RING: &str = "#ffe9a0";
 /// Space between things.
 const GAP: f32 = 20.0;
 const LEFT_WIDTH: f32 = 720.0;
@@ -161,7 +163,7 @@ fn draw(canvas: &mut Canvas, mark: &Mark, place: &dyn Fn(Point3) -> Option<([f32
         }
         Ink::Segment(_) | Ink::Eye => {}
         Ink::Lit(_) => {
-            let rim = Stroke { color: "#ffe9a0", width: 1.4, opacity: mark.opacity * fade, dash: "" };
+            let rim = Stroke { color: LAMP_RING, width: 1.4, opacity: mark.opacity * fade, dash: "" };
             canvas.disc(end, 5.0, "none", rim);
             canvas.disc(end, 2.0, "#ffe9a0", Stroke { width: 0.0, ..rim });
         }

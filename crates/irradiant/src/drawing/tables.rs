@@ -1,8 +1,8 @@
 //! What is written below a drawing: what the lines mean, and the numbers.
 
-use super::canvas::{Area, Canvas, Type};
+use super::canvas::{Area, Canvas, Stroke, Type};
 use super::marks::{BOUNCE_COLORS, Ink, Mark};
-use super::{DrawingOptions, EDGE, GAP, LEFT_WIDTH, PANEL, QUIET, RIGHT_WIDTH, WORDS};
+use super::{DrawingOptions, EDGE, GAP, LAMP_RING, LEFT_WIDTH, PANEL, QUIET, RIGHT_WIDTH, WORDS};
 use crate::render::Job;
 use irradiant_render::inspect::PathStory;
 use irradiant_render::record::{PathEnd, Technique};
@@ -56,13 +56,46 @@ pub(super) fn legend(canvas: &mut Canvas, at: [f32; 2], marks: &[Mark]) -> f32 {
         canvas.text([x + 33.0, y], &text, words);
         x += width;
     }
+    // What is no line: rings, dots, the camera.
     let note = Type { size: 13.0, color: QUIET, monospaced: false, bold: false };
-    let text = "faint: hidden from the camera";
-    if x + 7.0 * text.len() as f32 > right {
-        (x, y) = (at[0], y + LINE + 3.0);
+    let ring = |color| Stroke { color, width: 1.5, opacity: 1.0, dash: "" };
+    let dot = Stroke { color: "#000000", width: 1.0, opacity: 0.8, dash: "" };
+    let mut signs: Vec<(Sign, &str)> = vec![(Sign::Disc("none", ring("#ffffff")), "the pixel")];
+    if marks.iter().any(|m| m.is_vertex) {
+        let numbered = marks.iter().any(|m| !m.label.is_empty());
+        let words = if numbered { "a surface met (number: bounces before it)" } else { "a surface met" };
+        signs.push((Sign::Disc("#ffffff", dot), words));
     }
-    canvas.text([x, y], text, note);
+    if used(&|ink| matches!(ink, Ink::Lit(_))) {
+        signs.push((Sign::Disc("none", ring(LAMP_RING)), "light came from here"));
+    }
+    signs.push((Sign::Line(Ink::Eye), "the camera"));
+    signs.push((Sign::Nothing, "yellowish surfaces: lamps"));
+    signs.push((Sign::Nothing, "faint: hidden from the camera"));
+    (x, y) = (at[0], y + LINE + 3.0);
+    for (sign, text) in signs {
+        let before = if matches!(sign, Sign::Nothing) { 0.0 } else { 33.0 };
+        let width = before + 15.0 + 6.9 * text.len() as f32;
+        if x + width > right {
+            (x, y) = (at[0], y + LINE + 3.0);
+        }
+        match sign {
+            Sign::Disc(fill, rim) => canvas.disc([x + 13.0, y - 4.0], 4.2, fill, rim),
+            Sign::Line(ink) => canvas.line(&[[x, y - 4.0], [x + 26.0, y - 4.0]], ink.look()),
+            Sign::Nothing => {}
+        }
+        canvas.text([x + before, y], text, note);
+        x += width;
+    }
     y
+}
+
+/// How a note of the legend begins.
+enum Sign {
+    /// Filled so, with a rim.
+    Disc(&'static str, Stroke<'static>),
+    Line(Ink),
+    Nothing,
 }
 
 fn table(canvas: &mut Canvas, at: [f32; 2], heading: &str, head: &str, rows: &[String]) -> f32 {

@@ -143,7 +143,8 @@ fn reciprocity(c: &Context) -> Result<Outcome, Error> {
 
 fn reflection_equation(c: &Context) -> Result<Outcome, Error> {
     let mut sheet = Sheet::new();
-    let lights: [(&str, fn(Vec3) -> f64); 4] = [
+    type Light = fn(Vec3) -> f64;
+    let lights: [(&str, Light); 4] = [
         ("white", |_| 1.0),
         ("gradient", |w| 0.5 + 0.5 * f64::from(w.x)),
         ("soft lamp", |w| (6.0 * (f64::from(w.dot(Vec3::new(0.6, 0.0, 0.8))) - 1.0)).exp()),

@@ -132,7 +132,7 @@ fn hard_shadows(c: &Context) -> Result<Outcome, Error> {
         text = text.replace("Sampler \"independent\"", "Sampler \"independent\" \"integer seed\" 5");
         let file = c.file(name, &text)?;
         let settings = irradiant::RenderSettings { color: irradiant::ColorMode::Rgb, ..Default::default() };
-        Ok(whole(&*irradiant::Job::new(&file, &settings)?.scene, &*direct, 256))
+        Ok(whole(&irradiant::Job::new(&file, &settings)?.scene, &*direct, 256))
     };
     let point = "LightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ .5 4 0 ]\n";
     let (lit, shaded) = (row("point-lit", point, false)?, row("point-shadow", point, true)?);

@@ -93,7 +93,7 @@ fn linear(c: &Context) -> Result<Outcome, Error> {
         let file = c.file("sky-ball", text)?;
         let settings =
             irradiant::RenderSettings { seed: Some(3), color: irradiant::ColorMode::Rgb, ..Default::default() };
-        Ok(whole(&*irradiant::Job::new(&file, &settings)?.scene, &*c.production(None), 16))
+        Ok(whole(&irradiant::Job::new(&file, &settings)?.scene, &*c.production(None), 16))
     };
     let (one, two) = (seeded(&scene(1.0))?, seeded(&scene(2.0))?);
     let wrong: Vec<String> =

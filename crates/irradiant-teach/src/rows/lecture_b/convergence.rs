@@ -179,13 +179,8 @@ fn kajiya(c: &Context) -> Result<Outcome, Error> {
     sheet.at_most("RMSE at 128, stratified over independent", (smooth[5].1 - random[5].1).exp(), 1.0);
     let mut images = vec![];
     for spp in [4, 8, 16, 32, 64, 128] {
-        let setup = Setup {
-            size: Some([c.side(104), c.side(78)]),
-            spp: Some(spp),
-            spectral: true,
-            max_depth: Some(12),
-            ..Setup::default()
-        };
+        let setup =
+            Setup { size: Some([c.side(104), c.side(78)]), spp: Some(spp), spectral: true, max_depth: Some(12) };
         images.push(c.render("glass-on-green", scenes::GLASS_ON_GREEN, setup)?.image());
     }
     sheet.picture("B39-kajiya-1", "4, 8, 16 rays a pixel.", &strip(&images[..3].iter().collect::<Vec<_>>()), 0.0);
