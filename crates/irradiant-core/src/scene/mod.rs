@@ -125,7 +125,18 @@ impl Scene {
     /// What the sensor makes of radiance: linear RGB of the film's colour space.
     #[inline]
     pub fn film_rgb(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
-        let mut sensor = self.sensor.to_rgb(radiance, lambda);
+        self.film_rgb_of_response(self.sensor_response(radiance, lambda))
+    }
+
+    /// The first half of [`Scene::film_rgb`], linear in `radiance`: a sample's light may come in parts of different wavelengths.
+    #[inline]
+    pub fn sensor_response(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
+        self.sensor.to_rgb(radiance, lambda)
+    }
+
+    /// The second half of [`Scene::film_rgb`], of a whole sample.
+    #[inline]
+    pub fn film_rgb_of_response(&self, mut sensor: [f32; 3]) -> [f32; 3] {
         if self.max_component.is_finite() {
             // Asked for by the scene; labelled as biased in the header.
             let most = sensor[0].max(sensor[1]).max(sensor[2]);
