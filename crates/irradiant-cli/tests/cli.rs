@@ -330,7 +330,7 @@ fn light_at_a_point_and_the_rendering_equation_are_measured() {
         assert!(stderr(&output).contains("nothing was tested") && output.stdout.is_empty(), "{}", stderr(&output));
     }
     // Nor has darkness a share.
-    folder.write("dark.pbrt", &SCENE.replace("LightSource \"infinite\"\n", ""));
+    folder.write("dark.pbrt", &SCENE.replace("LightSource \"infinite\"\n", "").replace("0 0 3", "0 0 1.1"));
     let dark = folder.run(&["probe", "dark.pbrt", "--residual", "9", "--rays", "2", "--json"]);
     let value: serde_json::Value = serde_json::from_slice(&dark.stdout).expect("JSON");
     assert!(
