@@ -88,8 +88,9 @@ pub fn peak_memory_bytes() -> Option<u64> {
 
 /// Standard errors beyond which a material is named: once in 16,000 where all is right.
 const SUSPICIOUS: f64 = 4.0;
-const PBRT: &str =
-    ", known: pbrt-v4's weights evaluate its rough coat brighter than it is sampled (\"integer maxdepth\" 0 is exact)";
+const PBRT: &str = ", coat weighted as in pbrt-v4";
+const KNOWN: &str = "coats weighted as in pbrt-v4 are evaluated brighter than they are sampled: known, and biased in the picture too; \"integer maxdepth\" 0 \
+                     on the material is exact\n";
 const DISAGREES: &str = ": how it is sampled and how it is evaluated disagree; please report the scene";
 
 /// The books of energy as lines. Where something is missing, the materials that are known to be evaluated brighter than they are sampled,
@@ -124,6 +125,7 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
     }
     if known {
         text += &missing("  elsewhere", &books.missing_elsewhere, "");
+        text += KNOWN;
     }
     text
 }
