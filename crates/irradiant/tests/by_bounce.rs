@@ -5,6 +5,14 @@
 //! light alone. It is compared with the layer of a run without limit that has other samples. Both are made [`REPLICATES`] times
 //! from independent numbers, whose spread is the error bar; the whole picture and a ninth of it each are compared at
 //! [`SIGMAS`]. `--nocapture` shows the table: z, and the bias that would have been seen with a chance of 98 %.
+//!
+//! The code was broken four times to see it fail. Light samples after three and more events put into the layer of one event less: seen in
+//! all four scenes (K^2 of the Cornell box at 62 standard errors, Veach's plates 12, killeroos 17; K^4 of coffee 28). Light met by
+//! chance put into the layer of one event more, or not counted at the last surface that a limit allows: seen in coffee (K^1, a third of
+//! it, 56 and 70) and in Veach's plates (8 and 15); not in the Cornell box and the killeroos, where light met by chance behind a scattering event is
+//! less than one part in a thousand. So that way of going wrong is guarded only where the shared scenes are. Russian roulette that does not divide by
+//! the chance of survival is not seen, nor can it be: both sides play it (`lectures` and the books in `inspect` see it). K^0 says
+//! little: 21 % in the Cornell box, whose lamp a few pixels see, and nothing in coffee, where it is 0.
 
 use irradiant::core::film::exact::ExactSum;
 use irradiant::core::film::{Film, FilmTile};
