@@ -67,6 +67,24 @@ impl Portable {
     fn zip(self, b: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(std::array::from_fn(|i| f(self.0[i], b.0[i])))
     }
+    /// Lanes from 0 to 2^31, rounded down; what others become differs from machine to machine.
+    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
+    pub fn round_down(self) -> [u32; 4] {
+        self.0.map(|x| x as u32)
+    }
+    /// Whole numbers below 2^31.
+    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
+    pub fn from_integers(a: [u32; 4]) -> Self {
+        Self(a.map(|x| x as f32))
+    }
+    /// The first lanes of all three, the second, the third; the fourth is noise.
+    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
+    pub fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+        std::array::from_fn(|i| Self([a.0[i], b.0[i], c.0[i], 0.0]))
+    }
 }
 
 #[inline(always)]
@@ -209,7 +227,7 @@ mod sse {
     /// Calls baseline intrinsics.
     macro_rules! baseline {
         ($e:expr) => {
-            // SAFETY: SSE and SSE2 are part of every x86-64 target, and the only pointers are to whole `[f32; 4]`s,
+            // SAFETY: SSE and SSE2 are part of every x86-64 target, and the only pointers are to whole arrays of four,
             // read or written unaligned. Guard: `sse_lanes_agree_with_portable_ones`.
             unsafe { $e }
         };
@@ -236,6 +254,31 @@ mod sse {
     operator!(Div, div, _mm_div_ps);
     operator!(BitAnd, bitand, _mm_and_ps);
     operator!(BitOr, bitor, _mm_or_ps);
+
+    impl Sse {
+        /// Lanes from 0 to 2^31, rounded down; what others become differs from machine to machine.
+        #[inline(always)]
+        pub fn round_down(self) -> [u32; 4] {
+            let mut a = [0; 4];
+            baseline!(_mm_storeu_si128(a.as_mut_ptr().cast(), _mm_cvttps_epi32(self.0)));
+            a
+        }
+        /// Whole numbers below 2^31.
+        #[inline(always)]
+        pub fn from_integers(a: [u32; 4]) -> Self {
+            Self(baseline!(_mm_cvtepi32_ps(_mm_loadu_si128(a.as_ptr().cast()))))
+        }
+        /// The first lanes of all three, the second, the third; the fourth is noise.
+        #[inline(always)]
+        pub fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+            let (low, high) = (baseline!(_mm_unpacklo_ps(a.0, b.0)), baseline!(_mm_unpackhi_ps(a.0, b.0)));
+            [
+                Self(baseline!(_mm_shuffle_ps::<0b00_00_01_00>(low, c.0))),
+                Self(baseline!(_mm_shuffle_ps::<0b00_01_11_10>(low, c.0))),
+                Self(baseline!(_mm_shuffle_ps::<0b00_10_01_00>(high, c.0))),
+            ]
+        }
+    }
 
     impl Lanes for Sse {
         type Array = [f32; 4];
@@ -391,6 +434,17 @@ mod tests {
 
     #[test]
     fn sse_lanes_agree_with_portable_ones() {
+        for x in [[0.0, -0.0, 0.99, 1.0], [1.5, 63.999, 1e-40, 2_147_483_520.0]] {
+            assert_eq!(Portable::load(&x).round_down(), Sse::load(&x).round_down());
+            let n = Portable::load(&x).round_down();
+            assert_eq!(Portable::from_integers(n).to_array(), Sse::from_integers(n).to_array());
+        }
+        let rows = [[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [9.0, 10.0, 11.0, 12.0]];
+        let columns = Portable::transpose(rows.map(|r| Portable::load(&r))).map(|c| c.to_array());
+        let same_columns = Sse::transpose(rows.map(|r| Sse::load(&r))).map(|c| c.to_array());
+        for i in 0..3 {
+            assert_eq!(columns[i][..3], same_columns[i][..3]);
+        }
         for (i, &a) in VALUES.iter().enumerate() {
             for &b in &VALUES {
                 let (x, y) = ([a, b, VALUES[(i + 1) % 12], -a], [b, a, 0.5, b]);

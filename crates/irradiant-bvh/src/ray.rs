@@ -1,10 +1,13 @@
 //! What a query takes and gives back, and what the caller supplies for primitives that are not triangles.
 
+use crate::lanes::Lanes;
+
 /// A ray `o + t d` for `t` in the open interval (0, `t_max`).
 ///
 /// `d` need not be of unit length: `t` counts lengths of `d`. A ray with a NaN or infinite `o` or `d`, a zero `d`,
 /// or a `t_max` that is NaN or not positive meets nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Origin, in the space of the tree.
     pub o: [f32; 3],
@@ -14,6 +17,15 @@ pub struct Ray {
     pub d: [f32; 3],
     /// Time, handed to user primitives untouched.
     pub time: f32,
+}
+
+impl Ray {
+    /// Origin and direction in a register each, read at once; the fourth lanes are `t_max` and `time`.
+    #[inline(always)]
+    pub(crate) fn lanes<F: Lanes<Array = [f32; 4]>>(&self) -> (F, F) {
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.o, self.d);
+        (F::load(&[ox, oy, oz, self.t_max]), F::load(&[dx, dy, dz, self.time]))
+    }
 }
 
 /// Where a ray meets a triangle.

@@ -1,6 +1,6 @@
 //! Where a path met something: a surface point with all that scattering, texturing and leaving it need.
 
-use irradiant_math::{Normal3, Point2, Point3, Vec3};
+use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3};
 
 macro_rules! ids {
     ($($(#[$doc:meta])* $name:ident;)*) => {$(
@@ -74,6 +74,31 @@ pub struct ReferencePoint {
 }
 
 impl Interaction {
+    /// What a ray met at `t`, of which nothing is known yet but the ray.
+    #[inline]
+    pub fn unknown(ray: &Ray, t: f32) -> Self {
+        Self {
+            p: Point3::ZERO,
+            p_error: Vec3::ZERO,
+            n: Normal3::ZERO,
+            ns: Normal3::ZERO,
+            uv: Point2::ZERO,
+            dpdu: Vec3::ZERO,
+            dpdv: Vec3::ZERO,
+            dpdus: Vec3::ZERO,
+            dpdvs: Vec3::ZERO,
+            dndus: Normal3::ZERO,
+            dndvs: Normal3::ZERO,
+            wo: -ray.d.normalize(),
+            t,
+            time: ray.time,
+            material: MaterialId(0),
+            light: None,
+            shape: ShapeId(0),
+            face: 0,
+        }
+    }
+
     /// As lights see it.
     #[inline]
     pub fn reference(&self) -> ReferencePoint {

@@ -138,7 +138,7 @@ impl EncoderU8 {
     pub fn encode(&self, linear: f32) -> u8 {
         // NaN fails the comparison and leaves as 0.
         let clamped = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
-        let mut code = self.starts[(clamped * Self::CELLS as f32) as usize];
+        let mut code = self.starts[usize::from((clamped * Self::CELLS as f32) as u16)];
         while clamped >= self.thresholds[usize::from(code)] {
             code += 1;
         }

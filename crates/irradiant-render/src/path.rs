@@ -269,7 +269,8 @@ impl PathIntegrator {
                 *radiance += self.escaped(scene, walk, lambda, recorder);
                 return PathEnd::Escaped;
             };
-            let at = scene.geometry.interaction(&walk.ray, &hit);
+            let mut at = Interaction::unknown(&walk.ray, hit.t);
+            scene.geometry.fill_in(&walk.ray, &hit, &mut at);
 
             // Light that the ray meets by itself.
             if at.light.is_some() {

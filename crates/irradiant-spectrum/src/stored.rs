@@ -264,7 +264,11 @@ impl Spectrum {
         match &self.curve {
             Curve::Constant(c) => SampledSpectrum::splat(*c),
             Curve::Dense(values) => sample_dense(values, wavelengths),
-            Curve::PiecewiseLinear(table) => SampledSpectrum(wavelengths.lambda.map(|l| table.eval(l))),
+            Curve::PiecewiseLinear(table) => {
+                // Written out, as `map` would be called.
+                let [a, b, c, d] = wavelengths.lambda;
+                SampledSpectrum([table.eval(a), table.eval(b), table.eval(c), table.eval(d)])
+            }
             Curve::Blackbody(b) => SampledSpectrum(wavelengths.lambda.map(|l| b.eval(l))),
             Curve::RgbAlbedo(s) => s.polynomial.sample(wavelengths),
             Curve::RgbUnbounded(s) => s.polynomial.sample(wavelengths) * s.scale,

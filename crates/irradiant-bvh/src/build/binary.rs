@@ -39,7 +39,7 @@ pub(crate) struct Node {
 /// Splits `refs` (reordering them) into a tree. `refs` must not be empty.
 pub(crate) fn build(refs: &mut [Ref], split: Split) -> Vec<Node> {
     let mut nodes = Vec::new();
-    subtree(refs, split, 0, &mut nodes);
+    subtree(refs, split, 0, &mut nodes, &mut Scratch::new());
     nodes
 }
 
@@ -57,18 +57,12 @@ impl Bounds {
     }
     #[inline(always)]
     fn grow(&mut self, lo: Native, hi: Native) {
-        self.lo = lo.min(self.lo);
-        self.hi = hi.max(self.hi);
-    }
-    /// Half the surface area after scaling; 0 if empty.
-    #[inline(always)]
-    fn half_area(&self, scale: Native) -> f32 {
-        let [x, y, z, _] = ((self.hi - self.lo) * scale).max(Native::splat(0.0)).to_array();
-        x * y + y * z + z * x
+        self.lo = self.lo.min(lo);
+        self.hi = self.hi.max(hi);
     }
 }
 
-fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>) {
+fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>, scratch: &mut Scratch) {
     let mut boxes = Bounds::empty();
     let mut centres = Bounds::empty();
     for r in refs.iter() {
@@ -85,20 +79,23 @@ fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>) 
         return;
     }
     let middle = match split {
-        Split::Sah if depth < MAX_SAH_DEPTH => best_split(refs, &boxes, &centres),
+        Split::Sah if depth < MAX_SAH_DEPTH => best_split(refs, &boxes, &centres, scratch),
         Split::Sah | Split::Halve => None,
     };
     let middle = middle.unwrap_or_else(|| halve(refs, &centres, users));
     let (left, right) = refs.split_at_mut(middle);
     if left.len() + right.len() > PARALLEL {
         let mut second = Vec::new();
-        rayon::join(|| subtree(left, split, depth + 1, nodes), || subtree(right, split, depth + 1, &mut second));
+        rayon::join(
+            || subtree(left, split, depth + 1, nodes, scratch),
+            || subtree(right, split, depth + 1, &mut second, &mut Scratch::new()),
+        );
         nodes[at].right = (nodes.len() - at) as u32;
         nodes.append(&mut second);
     } else {
-        subtree(left, split, depth + 1, nodes);
+        subtree(left, split, depth + 1, nodes, scratch);
         nodes[at].right = (nodes.len() - at) as u32;
-        subtree(right, split, depth + 1, nodes);
+        subtree(right, split, depth + 1, nodes, scratch);
     }
 }
 
@@ -118,18 +115,6 @@ fn halve(refs: &mut [Ref], centres: &Bounds, users: usize) -> usize {
     middle
 }
 
-#[derive(Clone, Copy)]
-struct Bin {
-    bounds: Bounds,
-    count: u32,
-}
-
-/// Blocks that `n` triangles fill, as a cost.
-#[inline(always)]
-fn blocks(n: u32) -> f32 {
-    n.div_ceil(LEAF as u32) as f32
-}
-
 /// Maps centres to bins.
 struct Binning {
     origin: Native,
@@ -138,19 +123,74 @@ struct Binning {
 }
 
 impl Binning {
+    /// Bins along the three axes, as numbers in [0, last] that are still to be rounded down; the fourth lane is noise.
     #[inline(always)]
-    fn bins(&self, r: &Ref) -> [usize; 3] {
-        let [x, y, z, _] = ((r.lo() + r.hi() - self.origin) * self.scale).min(self.last).to_array();
-        // `as` saturates and sends NaN to 0.
-        [x as u32 as usize, y as u32 as usize, z as u32 as usize]
+    fn bins(&self, lo: Native, hi: Native) -> Native {
+        // `min` makes the last bin of a NaN, the product of an infinite distance and a scale of 0.
+        ((lo + hi - self.origin) * self.scale).min(self.last)
+    }
+}
+
+/// What a thread needs to find a split, kept from node to node: to clear all bins for each would take more stores than to fill
+/// the few that small nodes use.
+struct Scratch {
+    /// Boxes of the primitives in each bin along each axis. All are empty between splits.
+    bounds: [[Bounds; MAX_BINS]; 3],
+    /// How many those are, with the axes in the lanes; 0 between splits.
+    counts: [[u32; 4]; MAX_BINS],
+    /// Costs of everything at or above a bin, with the axes in the lanes.
+    above: [Native; MAX_BINS],
+}
+
+impl Scratch {
+    fn new() -> Box<Self> {
+        Box::new(Self {
+            bounds: [[Bounds::empty(); MAX_BINS]; 3],
+            counts: [[0; 4]; MAX_BINS],
+            above: [Native::splat(0.0); MAX_BINS],
+        })
+    }
+}
+
+/// What lies on one side of a plane, for a plane along each axis.
+struct Side {
+    bounds: [Bounds; 3],
+    counts: Native,
+    /// Brings extents to about 1 before areas are taken.
+    scale: Native,
+}
+
+impl Side {
+    #[inline(always)]
+    fn empty(scale: Native) -> Self {
+        Self { bounds: [Bounds::empty(); 3], counts: Native::splat(0.0), scale }
+    }
+
+    /// Adds the bins number `i`.
+    #[inline(always)]
+    fn grow(&mut self, bounds: &[[Bounds; MAX_BINS]; 3], counts: &[[u32; 4]; MAX_BINS], i: usize) {
+        for axis in 0..3 {
+            self.bounds[axis].grow(bounds[axis][i].lo, bounds[axis][i].hi);
+        }
+        self.counts = self.counts + Native::from_integers(counts[i]);
+    }
+
+    /// Area times the number of blocks that as many triangles fill; infinite, or no number, if nothing is there.
+    #[inline(always)]
+    fn costs(&self) -> Native {
+        let zero = Native::splat(0.0);
+        let [x, y, z] =
+            Native::transpose(self.bounds.map(|b| b.hi - b.lo)).map(|extent| (extent * self.scale).max(zero));
+        // Rounded up; exact for some millions of triangles, and one more or less does not matter where there are more.
+        let blocks = (self.counts + Native::splat(LEAF as f32 - 1.0)) * Native::splat(1.0 / LEAF as f32);
+        let blocks = Native::from_integers(blocks.round_down());
+        let none = self.counts.le(zero) & Native::splat(f32::INFINITY);
+        (x * y + y * z + z * x) * blocks | none
     }
 }
 
 /// Partitions `refs` at the cheapest plane between bins; `None` if no plane separates anything.
-///
-/// Not inlined, so that its bins do not sit in every frame of the recursion.
-#[inline(never)]
-fn best_split(refs: &mut [Ref], boxes: &Bounds, centres: &Bounds) -> Option<usize> {
+fn best_split(refs: &mut [Ref], boxes: &Bounds, centres: &Bounds, scratch: &mut Scratch) -> Option<usize> {
     let n_bins = (8 + refs.len() / 2).min(MAX_BINS);
     let extent = (centres.hi - centres.lo).to_array();
     let size = (boxes.hi - boxes.lo).to_array();
@@ -163,47 +203,50 @@ fn best_split(refs: &mut [Ref], boxes: &Bounds, centres: &Bounds) -> Option<usiz
         }
     }
     let binning = Binning { origin: centres.lo, scale: Native::load(&scale), last: Native::splat((n_bins - 1) as f32) };
-    let mut bins = [[Bin { bounds: Bounds::empty(), count: 0 }; 3]; MAX_BINS];
+    let Scratch { bounds, counts, above } = scratch;
     for r in refs.iter() {
         let (lo, hi) = (r.lo(), r.hi());
-        for (axis, bin) in binning.bins(r).into_iter().enumerate() {
-            let bin = &mut bins[bin & (MAX_BINS - 1)][axis];
-            bin.bounds.grow(lo, hi);
-            bin.count += 1;
+        // Masking changes nothing but lets the compiler drop its checks.
+        let bins = binning.bins(lo, hi).round_down().map(|bin| bin & (MAX_BINS as u32 - 1));
+        for axis in 0..3 {
+            let bin = bins[axis] as usize;
+            bounds[axis][bin].grow(lo, hi);
+            counts[bin][axis] += 1;
         }
     }
 
     // Costs of everything at or above a bin, then a sweep from below.
-    let mut above = [[0.0f32; 3]; MAX_BINS];
-    let mut right = [Bin { bounds: Bounds::empty(), count: 0 }; 3];
+    let mut right = Side::empty(area_scale);
     for i in (1..n_bins).rev() {
-        for axis in 0..3 {
-            right[axis].bounds.grow(bins[i][axis].bounds.lo, bins[i][axis].bounds.hi);
-            right[axis].count += bins[i][axis].count;
-            above[i][axis] = right[axis].bounds.half_area(area_scale) * blocks(right[axis].count);
-        }
+        right.grow(bounds, counts, i);
+        above[i] = right.costs();
     }
-    let total = refs.len() as u32;
-    let mut left = [Bin { bounds: Bounds::empty(), count: 0 }; 3];
-    let mut best = (f32::INFINITY, 0, 0);
+    let mut left = Side::empty(area_scale);
+    let (mut best, mut first_right) = (Native::splat(f32::INFINITY), Native::splat(0.0));
     for i in 1..n_bins {
-        for axis in 0..3 {
-            left[axis].bounds.grow(bins[i - 1][axis].bounds.lo, bins[i - 1][axis].bounds.hi);
-            left[axis].count += bins[i - 1][axis].count;
-            let cost = left[axis].bounds.half_area(area_scale) * blocks(left[axis].count) + above[i][axis];
-            if 0 < left[axis].count && left[axis].count < total && cost < best.0 {
-                best = (cost, axis, i);
-            }
-        }
+        left.grow(bounds, counts, i - 1);
+        let costs = left.costs() + above[i];
+        first_right = (costs.lt(best) & Native::splat(i as f32)).max(first_right);
+        best = costs.min(best);
     }
-    let (cost, axis, first_right) = best;
-    if cost == f32::INFINITY {
+    for axis in bounds {
+        axis[..n_bins].fill(Bounds::empty());
+    }
+    counts[..n_bins].fill([0; 4]);
+    // Of equal costs the lowest bin, and of equal bins the first axis.
+    let (best, first_right) = (best.to_array(), first_right.to_array());
+    let key = |axis: usize| (best[axis], first_right[axis]);
+    let axis = (1..3).fold(0, |least, axis| if key(axis) < key(least) { axis } else { least });
+    if best[axis] == f32::INFINITY {
         return None;
     }
-    // Branchless partition: swap always, advance if it belongs to the left.
+    let first_right = first_right[axis];
+    // Branchless partition: swap always, advance if it belongs to the left. Numbers that are not below the last bin, or
+    // are none, are in it, as above.
+    let (origin, scale) = (centres.lo.to_array()[axis], scale[axis]);
     let mut middle = 0;
     for i in 0..refs.len() {
-        let is_left = binning.bins(&refs[i])[axis] < first_right;
+        let is_left = (refs[i].centre(axis) - origin) * scale < first_right;
         refs.swap(i, middle);
         middle += usize::from(is_left);
     }

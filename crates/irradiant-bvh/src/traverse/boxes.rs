@@ -75,7 +75,7 @@ pub(crate) mod x86 {
     use core::arch::x86_64::*;
 
     use super::*;
-    use crate::lanes::Avx;
+    use crate::lanes::{Avx, Sse};
     use crate::level::Level;
     use crate::node::Bvh;
     use crate::ray::{Closest, Leaves};
@@ -166,33 +166,35 @@ pub(crate) mod x86 {
         /// Whether nothing overflows: every other ray takes [`Whole`].
         #[inline(always)]
         pub(crate) fn suits(ray: &Ray) -> bool {
-            let (inverse, _) = reciprocal(ray);
-            // Written so that NaN fails.
-            (0..3).all(|k| inverse[k].abs() < 1e30 && (ray.o[k] * inverse[k]).abs() < 1e30)
+            let (o, d) = ray.lanes::<Sse>();
+            let (inverse, limit) = (Sse::splat(1.0) / d, Sse::splat(1e30));
+            // Of the three axes; NaN fails.
+            (inverse.abs().lt(limit) & (o * inverse).abs().lt(limit)).mask() & 7 == 7
         }
     }
 
+    /// All three axes together as far as it goes; one by one it took 30 to 50 instructions more a ray.
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     fn prepare_fused(ray: &Ray) -> Fused {
-        let (inverse, first) = reciprocal(ray);
-        let splat = |a: f32| _mm256_set1_ps(a);
-        let [x, y, z] = inverse;
-        let padded = [x * PADDING, y * PADDING, z * PADDING];
-        let entering = |k: usize| {
-            let product = ray.o[k] * inverse[k];
-            splat(-product - product.abs() * Fused::LOST)
+        let (o, d) = ray.lanes::<Sse>();
+        let inverse = Sse::splat(1.0) / d;
+        let padded = inverse * Sse::splat(PADDING);
+        let (product, padded_product, lost) = (o * inverse, o * padded, Sse::splat(Fused::LOST));
+        let entering = product.abs() * Sse::splat(-Fused::LOST) - product;
+        let leaving = padded_product.abs() * lost - padded_product;
+        let splat = |v: Sse| {
+            let [x, y, z, _] = v.to_array();
+            [_mm256_set1_ps(x), _mm256_set1_ps(y), _mm256_set1_ps(z)]
         };
-        let leaving = |k: usize| {
-            let product = ray.o[k] * padded[k];
-            splat(product.abs() * Fused::LOST - product)
-        };
+        let signs = inverse.mask() as usize;
+        let side = |k: usize| 2 * k + (signs >> k & 1);
         Fused {
-            inverse: [splat(x), splat(y), splat(z)],
-            entering: [entering(0), entering(1), entering(2)],
-            padded: [splat(padded[0]), splat(padded[1]), splat(padded[2])],
-            leaving: [leaving(0), leaving(1), leaving(2)],
-            first,
+            inverse: splat(inverse),
+            entering: splat(entering),
+            padded: splat(padded),
+            leaving: splat(leaving),
+            first: [side(0), side(1), side(2)],
         }
     }
 

@@ -16,6 +16,7 @@ mod batch_tests;
 #[cfg(test)]
 mod tests;
 
+use crate::lanes::{Lanes, Native};
 use crate::level::Level;
 use crate::node::Bvh;
 use crate::ray::{Closest, Leaves, Ray};
@@ -68,11 +69,12 @@ impl Bvh {
 /// Whether `ray` can meet anything at all: finite origin and direction, some direction, and a positive length.
 #[inline(always)]
 fn is_proper(ray: &Ray) -> bool {
-    let [ox, oy, oz] = ray.o;
-    let [dx, dy, dz] = ray.d;
-    // Zero times anything finite is zero; NaN and infinities give NaN.
-    let zero = (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0);
-    zero == 0.0 && ray.t_max > 0.0 && (dx != 0.0 || dy != 0.0 || dz != 0.0)
+    let (o, d) = ray.lanes::<Native>();
+    let infinity = Native::splat(f32::INFINITY);
+    let (o, d) = (o.abs(), d.abs());
+    // Of the three axes; NaN fails.
+    let finite = (o.lt(infinity) & d.lt(infinity)).mask() & 7 == 7;
+    finite && ray.t_max > 0.0 && Native::splat(0.0).lt(d).mask() & 7 != 0
 }
 
 /// The closest hit so far, with the order that breaks ties.

@@ -20,14 +20,15 @@ pub struct SquareSum(i128);
 /// Largest magnitude of one sample whose square is summed (exclusive).
 pub const SQUARE_LIMIT: f32 = (1u64 << 29) as f32;
 
-/// `mantissa * 2^exponent`, rounded half away from zero to an integer. `exponent < 100` for 24-bit mantissas.
+/// `mantissa * 2^exponent`, rounded half away from zero to an integer. A mantissa has 53 bits at most, so what is shifted to
+/// the right fits one word; `exponent < 100` where it has 24.
 #[inline]
 fn scaled(mantissa: u64, exponent: i32) -> i128 {
     if exponent >= 0 {
         (mantissa as i128) << exponent
     } else if exponent > -64 {
         let shift = -exponent as u32;
-        ((mantissa as u128 + (1u128 << (shift - 1))) >> shift) as i128
+        i128::from((mantissa + (1 << (shift - 1))) >> shift)
     } else {
         0
     }

@@ -60,23 +60,29 @@ pub(crate) struct MeshRange {
 #[derive(Debug, Default)]
 pub(crate) struct MeshRanges {
     ranges: Vec<MeshRange>,
-    /// For each [`STRIDE`](Self::STRIDE) of triangles, and once past the last, the range of the first of them.
+    /// For each stride of triangles, and once past the last, the range of the first of them.
     guide: Vec<u32>,
+    /// Binary logarithm of the stride.
+    log2_stride: u32,
 }
 
 impl MeshRanges {
-    /// Triangles that share an entry of the guide.
-    const STRIDE: usize = 64;
+    /// Binary logarithm of how many triangles share an entry of the guide, where there are many. Up to [`Self::FEW`] each has
+    /// its own: a room of a dozen walls would be one entry, and searched through at every hit (60 instructions).
+    const LOG2_STRIDE: u32 = 6;
+    const FEW: u32 = 1 << 10;
 
     /// Of ranges that begin at 0 and follow each other, `triangles` in all.
     pub fn new(ranges: Vec<MeshRange>, triangles: u32) -> Self {
-        let entries = if ranges.is_empty() { 0 } else { (triangles as usize).div_ceil(Self::STRIDE) + 1 };
-        let range_of = |entry| {
-            let triangle = ((entry * Self::STRIDE) as u64).min(u64::from(triangles).saturating_sub(1));
+        let log2_stride = if triangles <= Self::FEW { 0 } else { Self::LOG2_STRIDE };
+        let stride = 1u64 << log2_stride;
+        let entries = if ranges.is_empty() { 0 } else { u64::from(triangles).div_ceil(stride) + 1 };
+        let range_of = |entry: u64| {
+            let triangle = (entry * stride).min(u64::from(triangles).saturating_sub(1));
             ranges.partition_point(|r: &MeshRange| u64::from(r.first) <= triangle) as u32 - 1
         };
         let guide = (0..entries).map(range_of).collect();
-        Self { ranges, guide }
+        Self { ranges, guide, log2_stride }
     }
 
     /// All of them, in order.
@@ -87,8 +93,12 @@ impl MeshRanges {
     /// The range that a triangle is in.
     #[inline]
     fn of(&self, triangle: u32) -> MeshRange {
-        let entry = triangle as usize / Self::STRIDE;
-        let (low, high) = (self.guide[entry] as usize, self.guide[entry + 1] as usize);
+        let entry = (triangle >> self.log2_stride) as usize;
+        let low = self.guide[entry] as usize;
+        if self.log2_stride == 0 {
+            return self.ranges[low];
+        }
+        let high = self.guide[entry + 1] as usize;
         if low == high {
             return self.ranges[low];
         }
@@ -370,7 +380,16 @@ mod tests {
     // Meshes of one triangle, of none, of many, and ends that fall on the guide's entries.
     #[test]
     fn every_triangle_is_found_in_its_mesh() {
-        for sizes in [&[1u32][..], &[0, 3, 0, 0, 61, 64, 1, 1, 1, 200, 0], &[64, 64, 64], &[1; 300], &[1000, 7]] {
+        for sizes in [
+            &[1u32][..],
+            &[0, 3, 0, 0, 61, 64, 1, 1, 1, 200, 0],
+            &[0, 3, 0, 0, 61, 64, 1, 1, 1, 2000, 0],
+            &[64; 40],
+            &[1; 300],
+            &[1; 3000],
+            &[1000, 24],
+            &[1000, 25],
+        ] {
             let (mut first, mut ranges, mut expected) = (0, Vec::new(), Vec::new());
             for (mesh, &size) in sizes.iter().enumerate() {
                 ranges.push(MeshRange { first, mesh: mesh as u32 });

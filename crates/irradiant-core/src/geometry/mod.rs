@@ -37,7 +37,7 @@ pub use emitter::{EmitterShape, NormalCone, ShapeSample};
 use crate::interaction::{Interaction, LightId, MaterialId, ShapeId, TextureContext};
 use accel::{Group, GroupLeaves, NO_EMITTER, Shapes, User, to_tree};
 use irradiant_bvh as bvh;
-use irradiant_math::{Bounds3, Normal3, Point2, Point3, Ray, Vec3};
+use irradiant_math::{Bounds3, Ray};
 use irradiant_scene::desc::FloatTextureRef;
 
 /// Evaluates opacity textures for hits that depend on them.
@@ -199,28 +199,16 @@ impl Geometry {
     /// What the ray met at `hit` (which [`Geometry::intersect`] gave for this very ray).
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
-        let mut at = Interaction {
-            p: Point3::ZERO,
-            p_error: Vec3::ZERO,
-            n: Normal3::ZERO,
-            ns: Normal3::ZERO,
-            uv: Point2::ZERO,
-            dpdu: Vec3::ZERO,
-            dpdv: Vec3::ZERO,
-            dpdus: Vec3::ZERO,
-            dpdvs: Vec3::ZERO,
-            dndus: Normal3::ZERO,
-            dndvs: Normal3::ZERO,
-            wo: -ray.d.normalize(),
-            t: hit.t,
-            time: ray.time,
-            material: MaterialId(0),
-            light: None,
-            shape: ShapeId(0),
-            face: 0,
-        };
-        self.fill(0, &to_tree(ray, f32::INFINITY), hit, hit.instances, &mut at);
+        let mut at = Interaction::unknown(ray, hit.t);
+        self.fill_in(ray, hit, &mut at);
         at
+    }
+
+    /// As [`Geometry::interaction`], into what [`Interaction::unknown`] made of the ray: for the loops of integrators, since
+    /// what is returned is first made elsewhere and then copied.
+    #[inline]
+    pub fn fill_in(&self, ray: &Ray, hit: &Hit, at: &mut Interaction) {
+        self.fill(0, &to_tree(ray, f32::INFINITY), hit, hit.instances, at);
     }
 
     /// Fills in a hit in the space of a group.

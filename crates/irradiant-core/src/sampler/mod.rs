@@ -13,8 +13,8 @@ use irradiant_math::hash::{hash2, hash4, mix32, permutation_element, unit_f32};
 use irradiant_math::sequence::DigitPermutations;
 use irradiant_math::sequence::{
     N_SOBOL_DIMENSIONS, PRIMES, SobolPixels, morton_encode_2, nested_uniform_scramble_base2,
-    owen_scrambled_radical_inverse, owen_sobol_2d, owen_sobol_4d, radical_inverse, scrambled_radical_inverse, sobol_4d,
-    sobol_64,
+    owen_scrambled_radical_inverse, owen_sobol_2d, owen_sobol_4d, owen_sobol_4d_of_reversed, radical_inverse,
+    scrambled_radical_inverse, sobol_4d, sobol_64,
 };
 use irradiant_scene::desc::{Randomization, SamplerKind};
 use std::cell::RefCell;
@@ -140,8 +140,9 @@ enum Source<'a> {
     Logged { key: u64, log: &'a DrawLog },
     /// Hashes of this and the block.
     Independent { key: u64 },
-    /// Point `index` of a scrambled Sobol sequence whose seed is mixed with the block.
-    Padded { index: u32, seed: u32, randomization: Randomization },
+    /// A point of a scrambled Sobol sequence whose seed is mixed with the block. Its index has its bits reversed, as all
+    /// blocks want it.
+    Padded { reversed_index: u32, seed: u32, randomization: Randomization },
     /// As `Padded`, two dimensions at a time.
     Pairs { index: u32, seed: u32 },
     /// Stratum `index` of x by y.
@@ -200,7 +201,9 @@ impl Sampler {
                 Source::Stratified { index, seed: pixel_seed(), x: x.max(1), y: y.max(1), jitter }
             }
             SamplerKind::Halton(randomization) => Source::Halton { index, seed: pixel_seed(), randomization },
-            SamplerKind::PaddedSobol(randomization) => Source::Padded { index, seed: pixel_seed(), randomization },
+            SamplerKind::PaddedSobol(randomization) => {
+                Source::Padded { reversed_index: index.reverse_bits(), seed: pixel_seed(), randomization }
+            }
             SamplerKind::Pmj02bn => Source::Pairs { index, seed: pixel_seed() },
             // Ahmed and Wonka 2020: consecutive runs of the sequence along a Morton curve over the image, so that
             // neighbouring pixels' errors cancel. The nested shuffle is base 2 here (theirs is base 4).
@@ -209,7 +212,11 @@ impl Sampler {
                 let index = (along << self.log2_samples) + index as u64;
                 // Beyond 2^32 points the sequence starts again, scrambled anew.
                 let seed = hash4(self.seed, index >> 32, (x >> 16) as u64, (y >> 16) as u64) as u32;
-                Source::Padded { index: index as u32, seed, randomization: Randomization::FastOwen }
+                Source::Padded {
+                    reversed_index: (index as u32).reverse_bits(),
+                    seed,
+                    randomization: Randomization::FastOwen,
+                }
             }
             SamplerKind::Sobol(randomization) => match &self.global {
                 Some(global) if (x | y) >> self.log2_size == 0 => Source::Global {
@@ -219,7 +226,7 @@ impl Sampler {
                     fallback: (index, pixel_seed()),
                     randomization,
                 },
-                _ => Source::Padded { index, seed: pixel_seed(), randomization },
+                _ => Source::Padded { reversed_index: index.reverse_bits(), seed: pixel_seed(), randomization },
             },
         };
         SampleStream { sampler: self, source }
@@ -240,7 +247,7 @@ impl Sampler {
             | SamplerKind::PaddedSobol(_)
             | SamplerKind::ZSobol
             | SamplerKind::Pmj02bn => Source::Padded {
-                index,
+                reversed_index: index.reverse_bits(),
                 seed: hash4(self.seed, u64::from(pass), 0, 2) as u32,
                 randomization: Randomization::FastOwen,
             },
@@ -349,13 +356,14 @@ impl SampleStream<'_> {
     #[inline]
     pub fn block(&self, block: u32) -> [f32; 4] {
         match self.source {
-            Source::Padded { index, seed, randomization } => {
+            Source::Padded { reversed_index, seed, randomization } => {
+                let index = || reversed_index.reverse_bits();
                 let seed = mix32(seed ^ block.wrapping_mul(0x9e37_79b9));
                 match randomization {
-                    Randomization::FastOwen | Randomization::Owen => owen_sobol_4d(index, seed),
-                    Randomization::None => sobol_4d(nested_uniform_scramble_base2(index, seed)).map(unit_f32),
+                    Randomization::FastOwen | Randomization::Owen => owen_sobol_4d_of_reversed(reversed_index, seed),
+                    Randomization::None => sobol_4d(nested_uniform_scramble_base2(index(), seed)).map(unit_f32),
                     Randomization::PermuteDigits => {
-                        let v = sobol_4d(nested_uniform_scramble_base2(index, seed));
+                        let v = sobol_4d(nested_uniform_scramble_base2(index(), seed));
                         std::array::from_fn(|d| unit_f32(v[d] ^ mix32(seed.wrapping_add(d as u32 + 1))))
                     }
                 }

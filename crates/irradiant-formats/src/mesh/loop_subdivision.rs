@@ -67,16 +67,14 @@ struct Level {
 }
 
 impl Level {
+    /// Which corner of a face a vertex of it is.
     fn corner(&self, face: u32, vertex: u32) -> usize {
-        self.faces[face as usize].iter().position(|v| *v == vertex).unwrap_or(0)
+        let [_, b, c] = self.faces[face as usize];
+        usize::from(b == vertex) + 2 * usize::from(c == vertex)
     }
 
     fn across_next(&self, face: u32, vertex: u32) -> u32 {
         self.neighbours[face as usize][self.corner(face, vertex)]
-    }
-
-    fn across_previous(&self, face: u32, vertex: u32) -> u32 {
-        self.neighbours[face as usize][previous(self.corner(face, vertex))]
     }
 
     /// The vertices around one, in order; its length is the valence.
@@ -86,8 +84,9 @@ impl Level {
         let mut face = start;
         if !self.boundary[vertex as usize] {
             loop {
-                out.push(self.faces[face as usize][next(self.corner(face, vertex))]);
-                face = self.across_next(face, vertex);
+                let corner = self.corner(face, vertex);
+                out.push(self.faces[face as usize][next(corner)]);
+                face = self.neighbours[face as usize][corner];
                 if face == start || face == NONE {
                     return;
                 }
@@ -102,8 +101,9 @@ impl Level {
         }
         out.push(self.faces[face as usize][next(self.corner(face, vertex))]);
         while face != NONE {
-            out.push(self.faces[face as usize][previous(self.corner(face, vertex))]);
-            face = self.across_previous(face, vertex);
+            let before = previous(self.corner(face, vertex));
+            out.push(self.faces[face as usize][before]);
+            face = self.neighbours[face as usize][before];
         }
     }
 
@@ -268,9 +268,10 @@ pub fn subdivide(positions: &[[f32; 3]], faces: &[[u32; 3]], levels: u32) -> Res
     }
     level.positions = limit;
     let mut normals = Vec::with_capacity(level.positions.len());
+    let mut directions = vec![];
     for v in 0..level.positions.len() as u32 {
         level.ring(v, &mut ring);
-        normals.push(normal(&level, v, &ring).map(|c| c as f32));
+        normals.push(normal(&level, v, &ring, &mut directions).map(|c| c as f32));
     }
     Ok(MeshData {
         positions: level.positions.iter().map(|p| p.map(|c| c as f32)).collect(),
@@ -280,15 +281,19 @@ pub fn subdivide(positions: &[[f32; 3]], faces: &[[u32; 3]], levels: u32) -> Res
     })
 }
 
-/// Cross product of the limit's tangents.
-fn normal(level: &Level, vertex: u32, ring: &[u32]) -> P {
+/// Cross product of the limit's tangents. `directions` keeps sines and cosines from one vertex to the next: most have as
+/// many neighbours.
+fn normal(level: &Level, vertex: u32, ring: &[u32], directions: &mut Vec<(f64, f64)>) -> P {
     let (mut s, mut t) = ([0.0; 3], [0.0; 3]);
     let n = ring.len();
     let at = |i: usize| &level.positions[ring[i] as usize];
     let p = &level.positions[vertex as usize];
     if !level.boundary[vertex as usize] {
-        for j in 0..n {
-            let (sin, cos) = sin_cos(std::f64::consts::TAU * j as f64 / n as f64);
+        if directions.len() != n {
+            directions.clear();
+            directions.extend((0..n).map(|j| sin_cos(std::f64::consts::TAU * j as f64 / n as f64)));
+        }
+        for (j, &(sin, cos)) in directions.iter().enumerate() {
             add(&mut s, cos, at(j));
             add(&mut t, sin, at(j));
         }

@@ -19,5 +19,6 @@ pub use halton::{
 pub use morton::{morton_decode_2, morton_decode_3, morton_encode_2, morton_encode_3};
 pub use owen::{
     laine_karras, nested_uniform_scramble_base2, owen_sobol_1d, owen_sobol_2d, owen_sobol_4d, owen_sobol_4d_bits,
+    owen_sobol_4d_of_reversed,
 };
 pub use sobol::{N_SOBOL_DIMENSIONS, SobolPixels, sobol, sobol_4d, sobol_64};

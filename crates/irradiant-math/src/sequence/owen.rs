@@ -58,10 +58,15 @@ fn reverse_bits_4(v: [u32; 4]) -> [u32; 4] {
 /// Different seeds give independent blocks, which is how more than four dimensions are padded. 10 to 20 ns.
 #[inline]
 pub fn owen_sobol_4d_bits(index: u32, seed: u32) -> [u32; 4] {
+    bits_of_reversed(index.reverse_bits(), seed)
+}
+
+#[inline(always)]
+fn bits_of_reversed(reversed_index: u32, seed: u32) -> [u32; 4] {
     let seeds = block_seeds(seed);
     // The shuffle is itself an Owen scramble of the index, which keeps aligned blocks together. The tables take reversed
     // indices and give reversed points, so that no reversal is wasted.
-    let v = look_up(&REVERSED_NIBBLES, laine_karras(index.reverse_bits(), seeds[4]));
+    let v = look_up(&REVERSED_NIBBLES, laine_karras(reversed_index, seeds[4]));
     let scrambled = laine_karras_4(v, [seeds[0], seeds[1], seeds[2], seeds[3]]);
     reverse_bits_4(scrambled)
 }
@@ -70,6 +75,12 @@ pub fn owen_sobol_4d_bits(index: u32, seed: u32) -> [u32; 4] {
 #[inline]
 pub fn owen_sobol_4d(index: u32, seed: u32) -> [f32; 4] {
     owen_sobol_4d_bits(index, seed).map(unit_f32)
+}
+
+/// [`owen_sobol_4d`] of the index whose reversed bits these are, for asking for many blocks of one index.
+#[inline]
+pub fn owen_sobol_4d_of_reversed(reversed_index: u32, seed: u32) -> [f32; 4] {
+    bits_of_reversed(reversed_index, seed).map(unit_f32)
 }
 
 /// The first of [`owen_sobol_4d`]'s dimensions, alone.

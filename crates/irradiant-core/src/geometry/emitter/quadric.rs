@@ -3,7 +3,7 @@
 use super::{Drawn, ShapeSample};
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
-use crate::geometry::placement::{Double3, Placement, dot, double, length, scale, single, sub};
+use crate::geometry::placement::{Double3, Placement, axes, dot, double, length, scale, single, sub};
 use crate::geometry::sphere::Sphere;
 use crate::interaction::ReferencePoint;
 use irradiant_math::warp::uniform_disk_concentric;
@@ -125,12 +125,12 @@ impl SphereEmitter {
         let axis = scale(to, -inverse_distance);
         let frame = Frame::from_z(single(axis).into());
         let (x, y) = (double(frame.x.to_array()), double(frame.y.to_array()));
-        let n = [0, 1, 2].map(|i| (x[i] * cos_phi as f64 + y[i] * sin_phi as f64) * sin_alpha + axis[i] * cos_alpha);
+        let n = axes(|i| (x[i] * cos_phi as f64 + y[i] * sin_phi as f64) * sin_alpha + axis[i] * cos_alpha);
         // The frame is unit to a single's precision; one step of Newton's makes that a double's.
         let n = scale(n, 1.5 - 0.5 * dot(n, n));
-        let p = [0, 1, 2].map(|i| center[i] + radius * n[i]);
+        let p = axes(|i| center[i] + radius * n[i]);
         let placement = &self.sphere.placement;
-        let error = [0, 1, 2].map(|i| p[i].abs() as f32 * gamma(2));
+        let error = axes(|i| p[i].abs() as f32 * gamma(2));
         let sign = if placement.flip { -1.0 } else { 1.0 };
         Drawn::BySolidAngle(ShapeSample {
             p: single(p).into(),
