@@ -7,7 +7,7 @@ mod robust;
 mod scene;
 
 use super::*;
-use irradiant_math::Transform;
+use irradiant_math::{Normal3, Point2, Point3, Transform, Vec3};
 use irradiant_scene::desc::shape::{CurveData, CurveStyle};
 use irradiant_scene::desc::{
     AreaLightDesc, ColorSpaceName, FloatParam, InstanceDesc, MaterialRef, MeshData, MotionDesc, ObjectDesc, ObjectRef,
