@@ -17,6 +17,7 @@ pub mod inspect;
 pub mod integrator;
 pub mod layered_path;
 pub mod lectures;
+mod light_samples;
 pub mod light_trace;
 pub mod light_walk;
 pub mod path;

@@ -7,23 +7,23 @@
 
 use crate::camera_samples::{CameraSample, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::light_samples::{direct_light, samples_of};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
-use crate::registry::{Options, words};
+use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::{Sides, TransportMode};
+use irradiant_core::bxdf::{BsdfSample, Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
-use irradiant_core::interaction::{Interaction, LightId, ReferencePoint};
-use irradiant_core::light::{LightSample, PixelLine, PixelRun, SampleMode};
-use irradiant_core::light_sampler::PickedLight;
-use irradiant_core::sampler::{LightDraws, SampleStream};
+use irradiant_core::interaction::{Interaction, ReferencePoint};
+use irradiant_core::light::{PixelLine, PixelRun, SampleMode};
+use irradiant_core::sampler::{LightDraws, SampleStream, ScatterDraws};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point2, Ray};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
 /// What can be set.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathIntegrator {
     /// Scattering events at most; `None`: no limit.
     pub max_depth: Option<u32>,
@@ -31,6 +31,8 @@ pub struct PathIntegrator {
     pub regularize: bool,
     /// When paths end by chance.
     pub roulette: Roulette,
+    /// Strata of the choice of a light at the first surface, 1 or more.
+    pub light_splits: u32,
 }
 
 /// When paths end by chance; the expected picture is the same.
@@ -50,6 +52,12 @@ words! {
         Throughput = "throughput",
         /// At each event with the chance q: shows light of many bounces with less noise, the picture with more.
         Constant = "constant",
+    }
+}
+
+impl Default for PathIntegrator {
+    fn default() -> Self {
+        Self { max_depth: None, regularize: false, roulette: Roulette::default(), light_splits: 1 }
     }
 }
 
@@ -94,9 +102,19 @@ impl Integrator for PathIntegrator {
     }
 }
 
+/// How lights are sampled at the first surface, by default with so many samples.
+pub(crate) const fn lights_option(default: u32) -> OptionEntry {
+    OptionEntry {
+        name: "lights",
+        range: OptionRange::Count(1, 64),
+        default: Value::Count(default),
+        doc: "light samples at the first surface, at most one of each light (A59)",
+    }
+}
+
 /// By name.
 pub const ENTRY: crate::registry::IntegratorEntry = {
-    use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
+    use crate::registry::{IntegratorEntry, LIGHT_SAMPLER};
     IntegratorEntry {
         name: "path",
         promise: "the production estimator: path tracing with multiple importance sampling and roulette on the throughput",
@@ -120,6 +138,7 @@ pub const ENTRY: crate::registry::IntegratorEntry = {
                 default: Value::Number(0.1),
                 doc: "chance to end a path at each event, with roulette=constant; of finite variance only where albedo^2 < 1 - q (B25)",
             },
+            lights_option(1),
             LIGHT_SAMPLER,
         ],
         make: |options, max_depth| Box::new(PathIntegrator::of(options, max_depth)),
@@ -147,9 +166,10 @@ struct FirstHit {
 /// Where the last scattering event was, for weighing a light that the next ray meets.
 pub(crate) struct Previous {
     pub reference: ReferencePoint,
-    /// Over the number of light samples taken there.
     pub bsdf_pdf: f32,
     pub specular: bool,
+    /// Strata of the choice of a light there.
+    pub light_splits: u32,
 }
 
 /// A path on its way: the next ray, what it meets, and what the path carries there.
@@ -159,8 +179,9 @@ pub(crate) struct Walk {
     pub throughput: SampledSpectrum,
     /// Scattering events so far.
     pub depth: u32,
-    /// Radiance is scaled by eta^2 at each refraction; roulette must not mistake that for brightness.
-    pub eta_scale: f32,
+    /// What roulette multiplies the throughput with: eta^2 for each refraction, since radiance is scaled by 1/eta^2 there, which is no
+    /// loss; and what the path carried to the place from which its throughput is counted, where that is not the camera.
+    pub roulette_scale: f32,
     pub previous: Option<Previous>,
     pub any_non_specular: bool,
     /// What the ray sees of the sky if it meets nothing, where that has been looked up.
@@ -176,7 +197,7 @@ impl Walk {
             met,
             throughput: SampledSpectrum::ONE,
             depth: 0,
-            eta_scale: 1.0,
+            roulette_scale: 1.0,
             previous: None,
             any_non_specular: false,
             escape_place: None,
@@ -191,13 +212,19 @@ impl PathIntegrator {
             Ends::Throughput => Roulette::Throughput,
             Ends::Constant => Roulette::Constant(options.number("q")),
         };
-        Self { max_depth, regularize: options.flag("regularize"), roulette }
+        Self { max_depth, regularize: options.flag("regularize"), roulette, light_splits: options.count("lights") }
     }
 
     /// Whether a path ends at a surface after so many scattering events.
     #[inline]
     pub(crate) fn is_at_limit(&self, depth: u32) -> bool {
         self.max_depth.is_some_and(|limit| depth >= limit)
+    }
+
+    /// Strata of the choice of a light at the surface after so many scattering events.
+    #[inline]
+    pub(crate) fn light_splits_at(&self, depth: u32) -> u32 {
+        if depth == 0 { self.light_splits } else { 1 }
     }
 
     /// What the camera ray sees, by one random path. Fills the layers of the film at the first surface.
@@ -307,8 +334,19 @@ impl PathIntegrator {
                     Some((draws, run)) if depth == 0 => (draws, Some(run)),
                     _ => (stream.light(depth), None),
                 };
-                *radiance +=
-                    direct_light(scene, &at, bsdf, &walk.throughput, lambda, &draws, run, 1.0, depth, stats, recorder);
+                *radiance += direct_light(
+                    scene,
+                    &at,
+                    bsdf,
+                    &walk.throughput,
+                    lambda,
+                    &draws,
+                    run,
+                    self.light_splits_at(depth),
+                    depth,
+                    stats,
+                    recorder,
+                );
             }
 
             let ended = self.scatter(scene, &at, bsdf, walk, stream, stats, recorder);
@@ -330,39 +368,21 @@ impl PathIntegrator {
         stats: &mut RenderStats,
         recorder: &mut R,
     ) -> Option<PathEnd> {
-        let depth = walk.depth;
-
-        // The next direction.
-        let draws = stream.scatter(depth);
-        let wo = at.wo;
-        let Some(sample) = bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
+        let draws = stream.scatter(walk.depth);
+        let Some(sample) = draw_direction(at, bsdf, walk, &draws, stats) else {
             return Some(PathEnd::Absorbed);
         };
-        walk.depth += 1;
-        stats.scatterings += 1;
-        stats.longest_path = stats.longest_path.max(walk.depth);
-        walk.throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
         if walk.throughput.is_black() {
             return Some(PathEnd::Absorbed);
-        }
-        let specular = sample.lobe.is_specular();
-        let bsdf_pdf = if sample.pdf_is_proportional && !specular {
-            bsdf.pdf(wo, sample.wi, TransportMode::Radiance, Sides::All)
-        } else {
-            sample.pdf
-        };
-        walk.any_non_specular |= !specular;
-        if sample.lobe.is_transmissive() {
-            walk.eta_scale *= sample.eta * sample.eta;
         }
 
         // Russian roulette: end paths that carry little.
         let survival = match self.roulette {
-            Roulette::Throughput => survival_probability(&walk.throughput, walk.eta_scale, walk.depth),
+            Roulette::Throughput => survival_probability(&walk.throughput, walk.roulette_scale, walk.depth),
             Roulette::Constant(q) => 1.0 - q,
         };
         recorder.scattering(&Scattering {
-            depth,
+            depth: walk.depth - 1,
             wi: sample.wi,
             lobe: sample.lobe,
             pdf: sample.pdf,
@@ -375,12 +395,33 @@ impl PathIntegrator {
             }
             walk.throughput *= 1.0 / survival;
         }
-        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular });
+        self.go(scene, at, bsdf, &sample, walk, stats);
+        None
+    }
+
+    /// Traces the ray of a direction that has been drawn.
+    #[inline(always)]
+    pub(crate) fn go(
+        &self,
+        scene: &Scene,
+        at: &Interaction,
+        bsdf: &Bsdf,
+        sample: &BsdfSample,
+        walk: &mut Walk,
+        stats: &mut RenderStats,
+    ) {
+        let specular = sample.lobe.is_specular();
+        let bsdf_pdf = if sample.pdf_is_proportional && !specular {
+            bsdf.pdf(at.wo, sample.wi, TransportMode::Radiance, Sides::All)
+        } else {
+            sample.pdf
+        };
+        let light_splits = self.light_splits_at(walk.depth - 1);
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular, light_splits });
         walk.ray = at.spawn_ray(sample.wi);
         walk.escape_place = scene.lights.place_of_escape(sample.wi);
         stats.bounce_rays += 1;
         walk.met = scene.geometry.intersect(&walk.ray, f32::INFINITY, &scene.alpha());
-        None
     }
 
     /// Light from environments that an escaping ray sees, weighed against having sampled them.
@@ -401,7 +442,9 @@ impl PathIntegrator {
             if emitted.is_black() {
                 continue;
             }
-            let light_pdf = from.map_or(0.0, |from| scene.light_sampler.pmf(from, light) * pdf);
+            let light_pdf = previous
+                .filter(|p| !p.specular)
+                .map_or(0.0, |p| samples_of(scene.light_sampler.pmf(&p.reference, light), p.light_splits) * pdf);
             let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
             let radiance = walk.throughput * emitted * weight;
@@ -436,7 +479,7 @@ impl PathIntegrator {
             return SampledSpectrum::ZERO;
         }
         let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
-            scene.light_sampler.pmf(&p.reference, light)
+            samples_of(scene.light_sampler.pmf(&p.reference, light), p.light_splits)
                 * scene.lights.get(light).pdf_hit(&p.reference, ray.d, &at.into())
         });
         let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
@@ -456,79 +499,25 @@ impl PathIntegrator {
     }
 }
 
-/// A sample of the light that arrives straight from lamps, unless something is in the way.
-pub(crate) struct LightPick {
-    pub light: LightId,
-    pub sample: LightSample,
-    /// Its radiance where it arrives, W m^-2 sr^-1 nm^-1, opacity included.
-    pub arriving: SampledSpectrum,
-    /// The density with which it was drawn, all lights together, 1/sr.
-    pub pdf: f32,
-}
-
-/// Picks a light and a point of it.
+/// Draws a direction at a vertex, and what the path carries there. `None` where the draw yields no direction.
 #[inline(always)]
-pub(crate) fn pick_light(
-    scene: &Scene,
-    at: &Interaction,
-    lambda: &Wavelengths,
-    draws: &LightDraws,
-    prepared: Option<PixelRun>,
-) -> Option<LightPick> {
-    let reference = at.reference();
-    let PickedLight { id: light, pmf } = scene.light_sampler.sample(&reference, draws.pick)?;
-    let mode = SampleMode::Compensated;
-    let sample = match (scene.lights.sky(), prepared) {
-        (Some((id, sky)), Some(run)) if id == light => sky.arrive(run, lambda, mode),
-        _ => scene.lights.get(light).sample(&reference, draws.uv, lambda, mode),
-    }?;
-    let arriving = sample.radiance * scene.opacity(&sample);
-    Some(LightPick { light, arriving, pdf: pmf * sample.pdf, sample })
-}
-
-/// Light that arrives straight from one sampled point of one sampled light and is scattered along the path: one of `count` such samples
-/// of a vertex.
-#[inline(always)]
-pub(crate) fn direct_light<R: PathRecorder>(
-    scene: &Scene,
+pub(crate) fn draw_direction(
     at: &Interaction,
     bsdf: &Bsdf,
-    throughput: &SampledSpectrum,
-    lambda: &Wavelengths,
-    draws: &LightDraws,
-    prepared: Option<PixelRun>,
-    count: f32,
-    depth: u32,
+    walk: &mut Walk,
+    draws: &ScatterDraws,
     stats: &mut RenderStats,
-    recorder: &mut R,
-) -> SampledSpectrum {
-    let Some(LightPick { light, sample, arriving, pdf }) = pick_light(scene, at, lambda, draws, prepared) else {
-        return SampledSpectrum::ZERO;
-    };
-    let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);
-    let f = f * sample.wi.dot(bsdf.frame.z).abs();
-    if f.is_black() || arriving.is_black() {
-        return SampledSpectrum::ZERO;
+) -> Option<BsdfSample> {
+    let sample = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All)?;
+    walk.depth += 1;
+    stats.scatterings += 1;
+    stats.longest_path = stats.longest_path.max(walk.depth);
+    walk.throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
+    walk.any_non_specular |= !sample.lobe.is_specular();
+    if sample.lobe.is_transmissive() {
+        walk.roulette_scale *= sample.eta * sample.eta;
     }
-    stats.shadow_rays += 1;
-    if scene.is_occluded(at, &sample) {
-        return SampledSpectrum::ZERO;
-    }
-    let light_pdf = pdf * count;
-    // Weigh against the chance that the BSDF would have found this light; it never finds a delta.
-    let weight = if sample.is_delta { 1.0 } else { power_heuristic(light_pdf, bsdf_pdf) };
-    let radiance = *throughput * f * arriving * (weight / light_pdf);
-    recorder.contribution(&Contribution {
-        bounces: depth + 1,
-        technique: Technique::LightSample,
-        light,
-        wi: sample.wi,
-        radiance,
-        mis_weight: weight,
-        light_pdf,
-        bsdf_pdf: if sample.is_delta { 0.0 } else { bsdf_pdf },
-    });
-    radiance
+    Some(sample)
 }
 
 /// Veach's power heuristic (beta = 2) for one sample of each of two techniques: the weight of the one with density `a`.
@@ -558,14 +547,14 @@ pub const SURVIVAL_RULE: &str = "1 after the first event; later twice the larges
 /// three more 0.74. Nearer to 1 is cheaper a sample, which matters where paths end early anyway.
 const ROULETTE_BELOW: f32 = 0.5;
 
-/// Chance to go on: the largest throughput, freed of the eta^2 scaling, over [`ROULETTE_BELOW`]; 1 for the first two
+/// Chance to go on: the largest throughput, with the scale of [`Walk`] for roulette, over [`ROULETTE_BELOW`]; 1 for the first two
 /// events.
 #[inline]
-pub(crate) fn survival_probability(throughput: &SampledSpectrum, eta_scale: f32, depth: u32) -> f32 {
+pub(crate) fn survival_probability(throughput: &SampledSpectrum, roulette_scale: f32, depth: u32) -> f32 {
     if depth <= 1 {
         return 1.0;
     }
-    let carried = (*throughput * eta_scale).max_component();
+    let carried = (*throughput * roulette_scale).max_component();
     let most = if depth < LONG_PATH { 1.0 } else { 0.95 };
     (carried * (1.0 / ROULETTE_BELOW)).min(most)
 }

@@ -8,8 +8,8 @@
 mod estimate;
 
 use estimate::{How, INSIDE, assert_agree, assert_is, cube, diffuse, estimate, film, lit_box, quad};
-use irradiant::ColorMode;
 use irradiant::scene::desc::IntegratorKind::{self, Path, RandomWalk, SimplePath};
+use irradiant::{ColorMode, IntegratorChoice};
 use irradiant_testkit::{Mean, assert_means_agree};
 
 const LIGHTS_AND_BSDF: IntegratorKind = SimplePath { sample_lights: true, sample_bsdf: true };
@@ -90,7 +90,7 @@ fn absorbing_things_in_a_furnace_do_not_depend_on_the_estimator() {
         (33, How::new(4096, 33).depth(14).by(LIGHTS_AND_BSDF)),
         (34, How::new(4096, 34).depth(14).by(BSDF_ONLY)),
     ] {
-        assert_agree(&free, &estimate(&scene, how), 0.015, &format!("estimate {seed}"));
+        assert_agree(&free, &estimate(&scene, how), 0.022, &format!("estimate {seed}"));
     }
 }
 
@@ -149,6 +149,35 @@ fn light_met_directly_mirrored_refracted_and_scattered_is_counted_once() {
     assert_agree(&path, &chance, 0.03, "path and chance");
     let sampled = estimate(&scene, How::new(16384, 403).by(LIGHTS_AND_BSDF).depth(4));
     assert_agree(&path, &sampled, 0.03, "path and light samples");
+}
+
+#[test]
+fn splitting_the_choice_of_a_light_changes_nothing_but_noise() {
+    // Four lamps of unequal power, a sky and a point light over rough metal and a diffuse floor: the power of some is sampled
+    // always, that of others sometimes, and directions find what light samples find. Seen to fail by 3 to 30 %: without the share of strata, and
+    // with a different number of samples in the weights of the two techniques.
+    let lamp = |x: f32, y: f32, radius: f32, power: f32| {
+        format!(
+            "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ {power} {power} {power} ]\nTranslate {x} {y} 0\nShape \"sphere\" \"float radius\" {radius}\nAttributeEnd\n"
+        )
+    };
+    let scene = film(8)
+        + "LookAt 0 1.5 -5  0 0.5 0  0 1 0\nCamera \"perspective\" \"float fov\" 55\nWorldBegin\n"
+        + "LightSource \"infinite\" \"rgb L\" [ .1 .2 .3 ]\nLightSource \"point\" \"rgb I\" [ 1 2 1 ] \"point3 from\" [ -2 1 -1 ]\n"
+        + &lamp(-2.0, 2.0, 0.6, 3.0)
+        + &lamp(-0.7, 2.0, 0.3, 8.0)
+        + &lamp(0.7, 2.0, 0.2, 12.0)
+        + &lamp(2.0, 1.0, 0.15, 6.0)
+        + &diffuse(0.6, 0.6, 0.6)
+        + &quad([[-9.0, -0.5, -9.0], [9.0, -0.5, -9.0], [9.0, -0.5, 0.5], [-9.0, -0.5, 0.5]])
+        + "Material \"conductor\" \"float roughness\" 0.2 \"rgb reflectance\" [ .9 .8 .7 ]\n"
+        + &quad([[-9.0, -0.5, 0.5], [9.0, -0.5, 0.5], [9.0, 4.0, 5.0], [-9.0, 4.0, 5.0]]);
+    let one = estimate(&scene, How::new(32768, 501).depth(2));
+    for (i, lights) in ["2", "3", "8", "64"].into_iter().enumerate() {
+        let choice = IntegratorChoice::named("path").and_then(|c| c.with_words(&format!("lights={lights}")));
+        let how = How::new(16384, 502 + i as u64).depth(2).by(choice.expect("an option of path"));
+        assert_agree(&one, &estimate(&scene, how), 0.022, &format!("one light sample and {lights}"));
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! are measured by the scatter of [`REPLICATES`] pictures. Means may be 6.5 joint standard errors apart: with 126 degrees of freedom a right
 //! program exceeds that with odds of 2e-9, or 1e-5 over all pixels here. Single pixels matter: what is wrong among companions, as a forgotten shadow
 //! ray, cancels in a block's mean. Seen to fail: without the shadow rays, without the densities of light samples at metals, without the
-//! scaling of a path that lost wavelengths.
+//! scaling of a path that lost wavelengths; and, by 2 to 20 % of like pixels, when those pixels took no part whose own paths failed.
 
 mod estimate;
 
@@ -100,7 +100,7 @@ fn the_diffuse_box_at_every_depth() {
     for (depth, power) in [(1, 0.01), (2, 0.01), (3, 0.01)] {
         assert_shared_is_right(&scene, "sharedpath", How::new(32, u64::from(depth)).depth(depth), power);
     }
-    assert_shared_is_right(&scene, "sharedpath lights=3", How::new(32, 4), 0.015);
+    assert_shared_is_right(&scene, "sharedpath lights=1", How::new(32, 4), 0.015);
 }
 
 #[test]
@@ -108,6 +108,77 @@ fn all_sorts_of_surfaces_and_lights() {
     let scene = all_sorts();
     assert_shared_is_right(&scene, "sharedpath", How::new(48, 11), 0.03);
     assert_shared_is_right(&scene, "sharedpath lights=2", How::new(32, 12).depth(3).spectral(), 0.06);
+}
+
+/// A box with a point light whose front wall is cut into stripes of two materials, two pixels wide, so that each block of pixels sees both.
+fn striped(a: &str, b: &str, behind: &str) -> String {
+    let walls = [[0.8; 3]; 6];
+    let room = cube(walls).replacen("Material \"diffuse\" \"rgb reflectance\" [ 0.8 0.8 0.8 ]", behind, 1);
+    let mut scene = film(8)
+        + "LookAt 0 0 0.5  0 0 1  0 1 0\nCamera \"perspective\" \"float fov\" 45\nWorldBegin\nLightSource \"point\" \"rgb I\" [ 1 1 1 ] \"point3 from\" [ 0 0 -0.5 ]\n"
+        + &room;
+    // Two pixels at the wall's distance.
+    let width = 2.0 * (2.0 * 0.49 * (22.5f32).to_radians().tan() / 8.0);
+    for i in -4..4 {
+        let x = i as f32 * width;
+        scene += if i % 2 == 0 { a } else { b };
+        scene += &quad([[x, -0.9, 0.99], [x + width, -0.9, 0.99], [x + width, 0.9, 0.99], [x, 0.9, 0.99]]);
+    }
+    scene
+}
+
+/// Compares the mean of like stripes, which no companions of another kind can hide: each must be right to `power`.
+#[track_caller]
+fn assert_stripes_are_right(scene: &str, how: How, power: f64) {
+    let mean = |how: &How, kind: usize| {
+        let pictures: Vec<[f64; 3]> = (0..REPLICATES)
+            .map(|i| {
+                let pixels = estimate(scene, How { seed: how.seed + 1000 * (i + 1), ..how.clone() }).mean;
+                let like: Vec<_> =
+                    pixels.iter().enumerate().filter(|(i, _)| i % 8 / 2 % 2 == kind).map(|(_, p)| p).collect();
+                [0, 1, 2].map(|c| like.iter().map(|p| p[c]).sum::<f64>() / like.len() as f64)
+            })
+            .collect();
+        let n = REPLICATES as f64;
+        [0, 1, 2].map(|c| {
+            let mean = pictures.iter().map(|p| p[c]).sum::<f64>() / n;
+            (mean, pictures.iter().map(|p| (p[c] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
+        })
+    };
+    for kind in 0..2 {
+        let shared = mean(&how.clone().by(choice("sharedpath")), kind);
+        let own = mean(&How { seed: how.seed + 500, ..how.clone() }, kind);
+        let brightest = own.map(|o| o.0).into_iter().fold(0.0, f64::max);
+        for (c, (s, o)) in shared.iter().zip(&own).enumerate() {
+            let error = (s.1 + o.1).sqrt();
+            let z = (s.0 - o.0) / error.max(1e-9);
+            eprintln!(
+                "stripe {kind} channel {c}: {:.5} and {:.5}, z {z:.2}, would see {:.2} %",
+                s.0,
+                o.0,
+                690.0 * error / brightest
+            );
+            assert!(z.abs() < 6.5, "stripe {kind} channel {c}: {} by shared paths, {} by others: z {z:.2}", s.0, o.0);
+            assert!(6.9 * error <= power * brightest, "only {:.2} % would be seen", 690.0 * error / brightest);
+        }
+    }
+}
+
+#[test]
+fn pixels_whose_paths_fail_take_part_all_the_same() {
+    let white = "Material \"diffuse\" \"rgb reflectance\" [ .8 .8 .8 ]\n";
+    // Facets that draw directions below the surface three times in ten.
+    let metal = "Material \"conductor\" \"float uroughness\" 0.2 \"float vroughness\" 1 \"bool remaproughness\" false \"rgb reflectance\" [ .8 .8 .8 ]\n";
+    let plain = "Material \"diffuse\" \"rgb reflectance\" [ 0.8 0.8 0.8 ]";
+    assert_stripes_are_right(&striped(metal, white, plain), How::new(128, 31).depth(2), 0.015);
+    // Black at most wavelengths.
+    let band = "Material \"diffuse\" \"spectrum reflectance\" [ 400 0 598 0 600 0.9 640 0.9 642 0 800 0 ]\n";
+    assert_stripes_are_right(&striped(band, white, plain), How::new(128, 32).depth(2).spectral(), 0.03);
+    // Of no use to the pixel that finds it.
+    let red = "Material \"diffuse\" \"rgb reflectance\" [ .8 0 0 ]\n";
+    let cyan =
+        "Material \"conductor\" \"float roughness\" 1 \"bool remaproughness\" false \"rgb reflectance\" [ 0 .9 .9 ]";
+    assert_stripes_are_right(&striped(red, white, cyan), How::new(128, 33).depth(3), 0.015);
 }
 
 #[test]
@@ -147,7 +218,8 @@ fn a_pixel_is_the_same_in_any_crop_and_has_less_noise() {
         picture.variance.iter().flatten().sum::<f64>()
     };
     let (shared, own) = (noise("sharedpath"), noise("path"));
-    assert!(shared < 0.5 * own, "variance {shared} by shared paths, {own} by others");
+    eprintln!("variance {:.2} of path's", shared / own);
+    assert!(shared < 0.3 * own, "variance {shared} by shared paths, {own} by others");
 }
 
 #[test]
@@ -155,7 +227,18 @@ fn mixes_that_hold_an_interface_are_refused() {
     let scene = film(4)
         + INSIDE
         + "WorldBegin\nMaterial \"diffuse\"\nMakeNamedMaterial \"a\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"b\" \"string type\" \"interface\"\nMaterial \"mix\" \"string materials\" [ \"a\" \"b\" ] \"float amount\" 0.5\nShape \"sphere\"\nLightSource \"infinite\"\n";
-    let file = load_text("test", &scene, ".").expect("a scene");
+    assert_refused(&scene);
+}
+
+#[test]
+fn surfaces_forced_to_be_diffuse_are_refused() {
+    // Their albedo goes by where they are seen from.
+    assert_refused(&("Option \"bool forcediffuse\" true\n".to_string() + &diffuse_box()));
+}
+
+#[track_caller]
+fn assert_refused(scene: &str) {
+    let file = load_text("test", scene, ".").expect("a scene");
     let why = render(&file, &How::new(1, 1).by(choice("sharedpath")).settings()).err().expect("refused").to_string();
     assert!(why.contains("--integrator path"), "{why}");
 }

@@ -384,6 +384,12 @@ impl Materials {
         self.may_pass
     }
 
+    /// Whether all materials are replaced by diffuse ones, whose albedo goes by where they are seen from (`Option "forcediffuse"`).
+    #[inline]
+    pub fn are_forced_diffuse(&self) -> bool {
+        self.force_diffuse
+    }
+
     /// Whether any material may scatter into single directions (a delta), for all that is known without looking textures up.
     pub fn may_be_specular(&self) -> bool {
         !self.force_diffuse && self.entries.iter().any(|entry| entry.material.may_be_specular())

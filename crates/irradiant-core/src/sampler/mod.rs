@@ -9,6 +9,7 @@
 //! values never depend on the sampler.
 
 use irradiant_math::Point2;
+use irradiant_math::elementary::ONE_MINUS_EPSILON;
 use irradiant_math::hash::{hash2, hash4, mix32, permutation_element, unit_f32};
 use irradiant_math::sequence::DigitPermutations;
 use irradiant_math::sequence::{
@@ -40,6 +41,14 @@ pub struct LightDraws {
     pub uv: Point2,
     /// One to spare, for resampling.
     pub resample: f32,
+}
+
+impl LightDraws {
+    /// [`LightDraws::pick`] squeezed into stratum `i` of `count` equal ones.
+    #[inline]
+    pub fn pick_in_stratum(&self, i: u32, count: u32) -> f32 {
+        ((self.pick + i as f32) / count as f32).min(ONE_MINUS_EPSILON)
+    }
 }
 
 /// Numbers for scattering at a vertex, each in [0, 1).

@@ -10,27 +10,33 @@
 //! second vertices of f_i(y) V_i(y) L(y) / sum over k of p_k(y) V_k(y). It is unbiased, and bounded where the BSDF is: the pixel's own path is in
 //! the sum.
 //!
-//! What is shared: second vertices on diffuse surfaces, whose light does not depend on where it is seen from, for first vertices on diffuse
-//! surfaces. All else (direct light at the first vertex, lamps that the path meets, other materials) is each pixel's own, as in
-//! [`path`](crate::path).
+//! Which pixels take part must not depend on what their paths do, or the sum over k would not be the density of what is there: a first vertex
+//! takes part as soon as the camera sees it, also when its own path draws no direction; and no path ends because it is of no use to its own pixel.
+//!
+//! What is shared: second vertices on diffuse surfaces, leaves and rough metals, for first vertices on the same. All else (direct light at the
+//! first vertex, lamps that the path meets, other materials) is each pixel's own, as in [`path`](crate::path).
 //!
 //! Errors of the pixels of a block go together: a picture has less noise per pixel but what is left is blotchy, and the mean over
 //! many pixels has the error that [`path`](crate::path) would give it. All of a block share the time; each path has wavelengths of its
 //! own, at which it is seen by all, or blocks would be tinted.
 
+mod share;
+
 use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use crate::path::{PathIntegrator, Previous, Walk, direct_light, pick_light, survival_probability};
+use crate::light_samples::{direct_light, pick_light};
+use crate::path::{PathIntegrator, Previous, Walk, draw_direction, lights_option, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
-use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
+use crate::registry::{IntegratorEntry, LIGHT_SAMPLER};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::{Bxdf, Sides, TransportMode};
+use irradiant_core::bxdf::{BsdfSample, Bxdf};
 use irradiant_core::film::{FilmTile, PixelBounds};
 use irradiant_core::interaction::{Interaction, ReferencePoint, TextureContext};
 use irradiant_core::sampler::CameraDraws;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use std::ops::Range;
 
 /// Side of a block, pixels.
 ///
@@ -46,16 +52,8 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "sharedpath",
     promise: "path tracing whose indirect light is shared among the pixels of a block",
     source: "Bekaert, Sbert and Halton 2002",
-    options: &[
-        OptionEntry {
-            name: "lights",
-            range: OptionRange::Count(1, 64),
-            default: Value::Count(1),
-            doc: "light samples at the first surface of each path",
-        },
-        LIGHT_SAMPLER,
-    ],
-    make: |options, max_depth| Box::new(SharedPathIntegrator { max_depth, light_samples: options.count("lights") }),
+    options: &[lights_option(4), LIGHT_SAMPLER],
+    make: |options, max_depth| Box::new(SharedPathIntegrator { max_depth, light_splits: options.count("lights") }),
 };
 
 /// What can be set.
@@ -63,8 +61,8 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
 pub struct SharedPathIntegrator {
     /// Scattering events at most; `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Light samples at the first surface, 1 or more.
-    pub light_samples: u32,
+    /// Strata of the choice of a light at the first surface, 1 or more.
+    pub light_splits: u32,
 }
 
 /// A surface that the camera sees.
@@ -73,25 +71,27 @@ struct First {
     footprint: TextureContext,
     /// At the wavelengths of its own path.
     bsdf: Bsdf,
-    /// What the path carries after it: f cos / pdf.
-    carried: SampledSpectrum,
 }
 
 /// A surface that a path meets next, with the light that it scatters (its own emission is not shared).
 struct Second {
     place: ReferencePoint,
     wo: Vec3,
+    /// Density with which its own path's first vertex found it, 1/sr.
+    pdf: f32,
+    /// What the path carries there: f cos / pdf.
+    carried: SampledSpectrum,
     light: Scattered,
 }
 
 /// Light that leaves a surface.
-// Kept from block to block: a box would be allocated at each surface.
+// A box would be allocated at each surface.
 #[allow(clippy::large_enum_variant)]
 enum Scattered {
     /// The same radiance in all directions of the side of this normal.
     Evenly { normal: Vec3, radiance: SampledSpectrum },
     /// As its BSDF has it.
-    By { bsdf: Bsdf, incoming: Vec<Incoming> },
+    By { bsdf: Bsdf, incoming: Range<usize> },
 }
 
 /// Light that arrives at a second vertex, by one sample of it.
@@ -118,19 +118,6 @@ struct Member<'a> {
     second: Option<Second>,
 }
 
-/// A second vertex as a first vertex sees it.
-#[derive(Clone, Copy)]
-struct Pair {
-    giver: u8,
-    receiver: u8,
-    /// Density with which the receiver's BSDF finds the vertex, per area.
-    pdf: f32,
-    /// What the light there is multiplied with on its way to the camera.
-    f: SampledSpectrum,
-    /// From the second to the first.
-    wo: Vec3,
-}
-
 /// What blocks need not allocate anew.
 #[derive(Default)]
 struct Scratch<'a> {
@@ -141,7 +128,9 @@ struct Scratch<'a> {
     rays: Vec<Ray>,
     ends: Vec<f32>,
     blocked: Vec<bool>,
-    pairs: Vec<Pair>,
+    pairs: Vec<share::Pair>,
+    /// Of all second vertices that scatter by their BSDF.
+    incoming: Vec<Incoming>,
 }
 
 impl Integrator for SharedPathIntegrator {
@@ -173,6 +162,11 @@ impl Integrator for SharedPathIntegrator {
                 "sharedpath cannot join surfaces through mixes that hold an interface; --integrator path can".into()
             );
         }
+        if scene.materials.are_forced_diffuse() {
+            return Err(
+                "sharedpath cannot share surfaces of Option \"forcediffuse\", whose albedo depends on the view; --integrator path can".into()
+            );
+        }
         Ok(())
     }
 
@@ -191,7 +185,8 @@ impl SharedPathIntegrator {
         scratch: &mut Scratch<'a>,
         stats: &mut RenderStats,
     ) {
-        let Scratch { members, layers, camera_rays, ends, .. } = scratch;
+        let Scratch { members, layers, camera_rays, ends, incoming, .. } = scratch;
+        incoming.clear();
         let time = scene.sampler.stream([block.x0, block.y0], index).camera().time;
         members.clear();
         for y in block.y0..block.y1 {
@@ -229,10 +224,10 @@ impl SharedPathIntegrator {
             let layers = &mut layers[i * channels..(i + 1) * channels];
             let mut lambda = member.lambda;
             let walk = Walk::from_camera(camera_ray.ray, hits[i]);
-            self.trace(scene, member, walk, &mut lambda, layers, stats);
+            self.trace(scene, member, walk, &mut lambda, layers, stats, incoming);
             member.lambda = lambda;
         }
-        share(scene, scratch, stats);
+        share::share(scene, scratch, stats);
         let Scratch { members, layers, .. } = scratch;
         for (i, member) in members.iter().enumerate() {
             let layers = &mut layers[i * channels..(i + 1) * channels];
@@ -251,8 +246,10 @@ impl SharedPathIntegrator {
         lambda: &mut Wavelengths,
         layers: &mut [f32],
         stats: &mut RenderStats,
+        incoming: &mut Vec<Incoming>,
     ) {
-        let path = PathIntegrator { max_depth: self.max_depth, ..PathIntegrator::default() };
+        let path =
+            PathIntegrator { max_depth: self.max_depth, light_splits: self.light_splits, ..PathIntegrator::default() };
         let Some(camera_ray) = member.sample.camera_ray else { return };
         let stream = member.sample.stream;
 
@@ -276,42 +273,37 @@ impl SharedPathIntegrator {
         if path.is_at_limit(0) {
             return;
         }
-        let count = self.light_samples;
         if bsdf.flags().is_non_specular() {
-            for i in 0..count {
-                let draws = if count == 1 {
-                    stream.light(0)
-                } else {
-                    scene.sampler.stream(member.sample.pixel, member.sample.index * count + i).light(0)
-                };
-                let (one, n) = (SampledSpectrum::ONE, count as f32);
-                member.radiance +=
-                    direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, n, 0, stats, &mut NoRecord);
-            }
-        }
-        if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_some() {
-            return;
-        }
-        if let Some(previous) = &mut walk.previous {
-            previous.bsdf_pdf /= count as f32;
+            let (draws, one) = (stream.light(0), SampledSpectrum::ONE);
+            let splits = path.light_splits_at(0);
+            member.radiance +=
+                direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, splits, 0, stats, &mut NoRecord);
         }
         if gains(&bsdf) {
-            member.first = Some(First { at, footprint, bsdf, carried: walk.throughput });
-            self.second(&path, scene, member, walk, lambda, stats);
-        } else {
+            let drawn = draw_direction(&at, &bsdf, &mut walk, &stream.scatter(0), stats);
+            if let Some(sample) = drawn {
+                path.go(scene, &at, &bsdf, &sample, &mut walk, stats);
+            }
+            member.first = Some(First { at, footprint, bsdf });
+            if let Some(BsdfSample { pdf, .. }) = drawn {
+                self.second(&path, scene, member, walk, pdf, lambda, stats, incoming);
+            }
+        } else if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_none() {
             member.radiance += go_on(&path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
         }
     }
 
-    /// The second vertex of a path whose first can be shared.
+    /// The second vertex of a path whose first can be shared and drew it with density `pdf`.
     fn second(
         &self,
         path: &PathIntegrator,
         scene: &Scene,
         member: &mut Member,
         mut walk: Walk,
+        pdf: f32,
         lambda: &mut Wavelengths,
         stats: &mut RenderStats,
+        incoming: &mut Vec<Incoming>,
     ) {
         let stream = member.sample.stream;
         let Some(hit) = walk.met else {
@@ -330,23 +322,17 @@ impl SharedPathIntegrator {
         if path.is_at_limit(1) {
             return;
         }
+        let direct_light = |throughput, lambda: &_, stats: &mut _| {
+            let draws = stream.light(1);
+            direct_light(scene, &at, &bsdf, throughput, lambda, &draws, None, 1, 1, stats, &mut NoRecord)
+        };
         if !is_shared(&bsdf) {
+            if walk.throughput.is_black() {
+                return;
+            }
             let mut radiance = SampledSpectrum::ZERO;
             if bsdf.flags().is_non_specular() {
-                let draws = stream.light(1);
-                radiance += direct_light(
-                    scene,
-                    &at,
-                    &bsdf,
-                    &walk.throughput,
-                    lambda,
-                    &draws,
-                    None,
-                    1.0,
-                    1,
-                    stats,
-                    &mut NoRecord,
-                );
+                radiance += direct_light(&walk.throughput, lambda, stats);
             }
             if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_none() {
                 radiance += go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
@@ -354,15 +340,13 @@ impl SharedPathIntegrator {
             member.radiance += radiance;
             return;
         }
+        // From here on light counts as it leaves this surface; roulette goes by what arrives at the camera.
+        let carried = walk.throughput;
+        walk.roulette_scale = carried.max_component().max(LEAST_IMPORTANCE);
+        walk.throughput = SampledSpectrum::ONE;
         let light = match bsdf.bxdf {
             Bxdf::Diffuse(_) => {
-                // From here on light counts as it leaves this surface; roulette goes by what arrives at the camera.
-                walk.eta_scale = walk.throughput.max_component();
-                walk.throughput = SampledSpectrum::ONE;
-                let draws = stream.light(1);
-                let one = SampledSpectrum::ONE;
-                let mut radiance =
-                    direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, 1.0, 1, stats, &mut NoRecord);
+                let mut radiance = direct_light(&walk.throughput, lambda, stats);
                 if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_none() {
                     radiance += go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
                 }
@@ -370,11 +354,12 @@ impl SharedPathIntegrator {
                 Scattered::Evenly { normal, radiance }
             }
             _ => {
-                let incoming = self.incoming(path, scene, member, &at, &bsdf, walk, lambda, stats);
-                Scattered::By { bsdf, incoming }
+                let begin = incoming.len();
+                self.incoming(path, scene, member, &at, &bsdf, walk, lambda, stats, incoming);
+                Scattered::By { bsdf, incoming: begin..incoming.len() }
             }
         };
-        member.second = Some(Second { place: at.reference(), wo: at.wo, light });
+        member.second = Some(Second { place: at.reference(), wo: at.wo, pdf, carried, light });
     }
 
     /// Light that arrives at a second vertex: by a light sample, and by a direction drawn from the BSDF.
@@ -388,43 +373,38 @@ impl SharedPathIntegrator {
         mut walk: Walk,
         lambda: &mut Wavelengths,
         stats: &mut RenderStats,
-    ) -> Vec<Incoming> {
+        incoming: &mut Vec<Incoming>,
+    ) {
         let stream = &member.sample.stream;
-        let mut incoming = Vec::with_capacity(4);
-        if let Some(pick) = pick_light(scene, at, lambda, &stream.light(1), None)
-            && !pick.arriving.is_black()
+        if let Some(pick) = pick_light(scene, at, lambda, &stream.light(1))
+            && !pick.radiance.is_black()
         {
             stats.shadow_rays += 1;
             if !scene.is_occluded(at, &pick.sample) {
                 incoming.push(Incoming {
                     wi: pick.sample.wi,
-                    radiance: pick.arriving,
+                    radiance: pick.radiance,
                     light_pdf: pick.pdf,
                     found_by_bsdf: !pick.sample.is_delta,
                 });
             }
         }
         let draws = stream.scatter(1);
-        let Some(drawn) = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All) else {
-            return incoming;
-        };
-        walk.depth += 1;
-        stats.scatterings += 1;
-        stats.longest_path = stats.longest_path.max(walk.depth);
-        walk.throughput *= drawn.f * (bsdf.abs_cos(drawn.wi) / drawn.pdf);
-        let survival = survival_probability(&walk.throughput, walk.eta_scale, walk.depth);
-        if walk.throughput.is_black() || draws.roulette >= survival {
-            return incoming;
+        let Some(drawn) = draw_direction(at, bsdf, &mut walk, &draws, stats) else { return };
+        // By one number, not by colours, and never to nothing: others see the surface from elsewhere.
+        let importance = walk.roulette_scale * walk.throughput.max_component().max(LEAST_IMPORTANCE);
+        let survival = survival_probability(&SampledSpectrum::splat(importance), 1.0, walk.depth);
+        if draws.roulette >= survival {
+            return;
         }
-        walk.eta_scale *= walk.throughput.max_component();
+        walk.roulette_scale = importance;
         walk.throughput = SampledSpectrum::splat(1.0 / survival);
-        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 1.0, specular: false });
-        walk.ray = at.spawn_ray(drawn.wi);
-        walk.escape_place = scene.lights.place_of_escape(drawn.wi);
-        stats.bounce_rays += 1;
-        walk.met = scene.geometry.intersect(&walk.ray, f32::INFINITY, &scene.alpha());
+        path.go(scene, at, bsdf, &drawn, &mut walk, stats);
+        // Weights other than 0 and 1 against light samples are found when all see it: with density 1 for the direction only what
+        // light samples cannot find has the weight 1.
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 1.0, specular: false, light_splits: 1 });
         // Lamps that light samples could have found; then all else.
-        let mut lamps = Lamps(drawn.wi, &mut incoming);
+        let mut lamps = Lamps(drawn.wi, incoming);
         match walk.met {
             None => _ = path.escaped(scene, &walk, lambda, &mut lamps),
             Some(hit) => {
@@ -434,10 +414,9 @@ impl SharedPathIntegrator {
                 }
             }
         }
-        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 0.0, specular: false });
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 0.0, specular: false, light_splits: 1 });
         let radiance = go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
         incoming.push(Incoming { wi: drawn.wi, radiance, light_pdf: 0.0, found_by_bsdf: true });
-        incoming
     }
 }
 
@@ -478,6 +457,9 @@ fn is_shared(bsdf: &Bsdf) -> bool {
     }
 }
 
+/// What roulette takes a path's own pixel to be worth at least, since others may see more of what the path finds.
+const LEAST_IMPORTANCE: f32 = 0.1;
+
 /// First vertices on metals with facets of a smaller alpha do not take part: what lights one pixel's mirror image is of no use to its
 /// neighbour's.
 const LEAST_ALPHA: f32 = 0.04;
@@ -514,109 +496,4 @@ fn blocks(bounds: &PixelBounds) -> impl Iterator<Item = PixelBounds> {
     (first(bounds.y0)..bounds.y1).step_by(SIDE as usize).flat_map(move |y0| {
         (left..right).step_by(SIDE as usize).map(move |x0| PixelBounds { x0, y0, x1: x0 + SIDE, y1: y0 + SIDE })
     })
-}
-
-/// Brings the light of all second vertices to all first ones.
-fn share(scene: &Scene, scratch: &mut Scratch, stats: &mut RenderStats) {
-    let Scratch { members, layers, rays, ends, blocked, pairs, .. } = scratch;
-    rays.clear();
-    pairs.clear();
-    for (j, giver) in members.iter().enumerate() {
-        let Some(second) = &giver.second else { continue };
-        for (i, receiver) in members.iter().enumerate() {
-            let Some(first) = &receiver.first else { continue };
-            let d = second.place.p - first.at.p;
-            let r2 = d.length_squared();
-            let wi = d * (1.0 / r2.sqrt());
-            if let Scattered::Evenly { normal, .. } = second.light
-                && !(wi.dot(normal) < 0.0)
-            {
-                continue;
-            }
-            let Some(bsdf) = receiver.bsdf_at(scene, first, &giver.lambda) else { continue };
-            let (f, pdf) = bsdf.f_and_pdf(first.at.wo, wi, TransportMode::Radiance);
-            // Per area instead of solid angle.
-            let there = wi.dot_normal(second.place.n).abs() / r2;
-            let pdf = pdf * there;
-            if !(pdf > 0.0) || !pdf.is_finite() {
-                continue;
-            }
-            let f = f * (bsdf.abs_cos(wi) * there);
-            pairs.push(Pair { giver: j as u8, receiver: i as u8, pdf, f, wo: -wi });
-            if i != j {
-                let ReferencePoint { p, p_error, n, .. } = second.place;
-                rays.push(first.at.spawn_ray_to(p, p_error, n));
-            }
-        }
-    }
-    ends.clear();
-    ends.resize(rays.len(), 1.0);
-    blocked.clear();
-    blocked.resize(rays.len(), false);
-    // Those to one second vertex travel together.
-    let mut first = 0;
-    for to_one in pairs.chunk_by(|a, b| a.giver == b.giver) {
-        let count = to_one.iter().filter(|p| p.giver != p.receiver).count();
-        let these = first..first + count;
-        scene.geometry.occluded_batch(&rays[these.clone()], &ends[these.clone()], &scene.alpha(), &mut blocked[these]);
-        first += count;
-    }
-    stats.shadow_rays += rays.len() as u64;
-    let mut answers = blocked.iter();
-    pairs.retain(|pair| pair.giver == pair.receiver || answers.next() != Some(&true));
-
-    let channels = scene.layers.channels();
-    let mut rest = &pairs[..];
-    for j in 0..members.len() {
-        let (seen, others) = rest.split_at(rest.partition_point(|p| usize::from(p.giver) <= j));
-        rest = others;
-        let (Some(second), Some(first)) = (members[j].second.take(), &members[j].first) else { continue };
-        // Where numbers are too coarse to see again what the path saw, at grazing angles, it keeps what it found.
-        let own = [Pair { giver: j as u8, receiver: j as u8, pdf: 1.0, f: first.carried, wo: second.wo }];
-        let seen = if seen.iter().any(|p| p.receiver == p.giver) { seen } else { &own };
-        let lambda = members[j].lambda;
-        second.light.give(seen, |receiver, radiance| {
-            let member = &mut members[receiver];
-            let response = scene.sensor_response(radiance, &lambda);
-            (0..3).for_each(|c| member.shared[c] += response[c]);
-            let weight = member.sample.camera_ray.map_or(0.0, |c| c.weight);
-            scene.layers.add_buckets(
-                radiance * weight,
-                &lambda,
-                &mut layers[receiver * channels..(receiver + 1) * channels],
-            );
-        });
-    }
-}
-
-impl Scattered {
-    /// Gives each first vertex that sees this one its share: its member and the radiance that reaches the camera.
-    fn give(&self, seen: &[Pair], mut to: impl FnMut(usize, SampledSpectrum)) {
-        match self {
-            Self::Evenly { radiance, .. } => {
-                let total: f32 = seen.iter().map(|p| p.pdf).sum();
-                for pair in seen {
-                    to(usize::from(pair.receiver), pair.f * *radiance * (1.0 / total));
-                }
-            }
-            Self::By { bsdf, incoming } => {
-                for light in incoming {
-                    let mut f = [SampledSpectrum::ZERO; PIXELS];
-                    let mut total = 0.0;
-                    for (pair, f) in seen.iter().zip(&mut f) {
-                        let (value, pdf) = bsdf.f_and_pdf(pair.wo, light.wi, TransportMode::Radiance);
-                        *f = value;
-                        total += pair.pdf * (light.light_pdf + if light.found_by_bsdf { pdf } else { 0.0 });
-                    }
-                    if !(total > 0.0) {
-                        continue;
-                    }
-                    let radiance = light.radiance * (bsdf.abs_cos(light.wi) / total);
-                    for (pair, f) in seen.iter().zip(&f) {
-                        to(usize::from(pair.receiver), pair.f * *f * radiance);
-                    }
-                }
-            }
-        }
-    }
 }

@@ -1,0 +1,164 @@
+//! Light samples of the production estimators: light that arrives at a surface straight from sampled points of lights.
+//!
+//! One light is picked by the scene's light sampler. Or the choice is split (ledger A59): the interval of the number that picks is cut into
+//! N equal strata, each picks a light, and each light that is picked is sampled once, whatever the number of strata it is in, all with the
+//! same place on them. A scene with one light then costs and brings what it does with one sample, stratification included; with a few lights all
+//! of them are sampled.
+//!
+//! Tried and worse, each with a place of its own on each light: of N candidates the one tested that would bring most unoccluded, by chance in
+//! proportion (resampling; Talbot, Cline and Egbert 2005). 16 samples per pixel of Veach's plates by `sharedpath`, N = 4: relative variance
+//! 0.0072, with the same place on all lights 0.0065, with all tested 0.0057 for 1.1 times the time. One lamp's own stratification suffers
+//! (Cornell box, N = 2: 1.2 times the variance), and where sunlight is blocked it is noisier than one sample.
+
+use crate::integrator::RenderStats;
+use crate::path::power_heuristic;
+use crate::record::{Contribution, PathRecorder, Technique};
+use irradiant_core::bsdf::Bsdf;
+use irradiant_core::bxdf::TransportMode;
+use irradiant_core::interaction::{Interaction, LightId};
+use irradiant_core::light::{LightSample, PixelRun, SampleMode};
+use irradiant_core::light_sampler::PickedLight;
+use irradiant_core::sampler::LightDraws;
+use irradiant_core::scene::Scene;
+use irradiant_math::Point2;
+use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+
+/// A sample of the light that arrives straight from lamps, unless something is in the way.
+pub(crate) struct ArrivingLight {
+    pub light: LightId,
+    pub sample: LightSample,
+    /// Its radiance where it arrives, W m^-2 sr^-1 nm^-1, opacity included.
+    pub radiance: SampledSpectrum,
+    /// The density with which it was drawn, all lights together, 1/sr.
+    pub pdf: f32,
+}
+
+/// Picks a light and a point of it.
+#[inline(always)]
+pub(crate) fn pick_light(
+    scene: &Scene,
+    at: &Interaction,
+    lambda: &Wavelengths,
+    draws: &LightDraws,
+) -> Option<ArrivingLight> {
+    let picked = scene.light_sampler.sample(&at.reference(), draws.pick)?;
+    sample_light(scene, at, lambda, picked, draws.uv, None)
+}
+
+/// A point of a light that has been picked.
+#[inline(always)]
+fn sample_light(
+    scene: &Scene,
+    at: &Interaction,
+    lambda: &Wavelengths,
+    PickedLight { id: light, pmf }: PickedLight,
+    uv: Point2,
+    prepared: Option<PixelRun>,
+) -> Option<ArrivingLight> {
+    let reference = at.reference();
+    let mode = SampleMode::Compensated;
+    let sample = match (scene.lights.sky(), prepared) {
+        (Some((id, sky)), Some(run)) if id == light => sky.arrive(run, lambda, mode),
+        _ => scene.lights.get(light).sample(&reference, uv, lambda, mode),
+    }?;
+    let radiance = sample.radiance * scene.opacity(&sample);
+    Some(ArrivingLight { light, radiance, pdf: pmf * sample.pdf, sample })
+}
+
+/// How often a light that is picked with the chance `pmf` is sampled on average, of `splits` strata.
+#[inline]
+pub(crate) fn samples_of(pmf: f32, splits: u32) -> f32 {
+    (pmf * splits as f32).min(1.0)
+}
+
+/// Light that arrives straight from sampled points of sampled lights and is scattered along the path, the choice of the light split into
+/// `splits` strata.
+#[inline(always)]
+pub(crate) fn direct_light<R: PathRecorder>(
+    scene: &Scene,
+    at: &Interaction,
+    bsdf: &Bsdf,
+    throughput: &SampledSpectrum,
+    lambda: &Wavelengths,
+    draws: &LightDraws,
+    prepared: Option<PixelRun>,
+    splits: u32,
+    depth: u32,
+    stats: &mut RenderStats,
+    recorder: &mut R,
+) -> SampledSpectrum {
+    let mut sum = SampledSpectrum::ZERO;
+    if splits == 1 || scene.lights.as_slice().len() == 1 {
+        if let Some(picked) = scene.light_sampler.sample(&at.reference(), draws.pick)
+            && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
+        {
+            sum = scattered(scene, at, bsdf, throughput, arriving, picked.pmf, 1.0, depth, stats, recorder);
+        }
+        return sum;
+    }
+    let pick = |stratum| scene.light_sampler.sample(&at.reference(), draws.pick_in_stratum(stratum, splits));
+    let mut next = pick(0);
+    let mut stratum = 0;
+    while stratum < splits {
+        let picked = next;
+        // Those of one light lie side by side.
+        let mut times = 0;
+        while stratum < splits && next == picked {
+            times += 1;
+            stratum += 1;
+            if stratum < splits {
+                next = pick(stratum);
+            }
+        }
+        if let Some(picked) = picked
+            && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
+        {
+            let share = times as f32 / splits as f32;
+            let samples = samples_of(picked.pmf, splits);
+            sum += scattered(scene, at, bsdf, throughput, arriving, samples, share, depth, stats, recorder);
+        }
+    }
+    sum
+}
+
+/// What one light sample brings along the path; it counts for the `share` of all samples at the vertex. Its light has `samples` there
+/// on average.
+#[inline(always)]
+fn scattered<R: PathRecorder>(
+    scene: &Scene,
+    at: &Interaction,
+    bsdf: &Bsdf,
+    throughput: &SampledSpectrum,
+    arriving: ArrivingLight,
+    samples: f32,
+    share: f32,
+    depth: u32,
+    stats: &mut RenderStats,
+    recorder: &mut R,
+) -> SampledSpectrum {
+    let ArrivingLight { light, sample, radiance: arriving, pdf } = arriving;
+    let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);
+    let f = f * sample.wi.dot(bsdf.frame.z).abs();
+    if f.is_black() || arriving.is_black() {
+        return SampledSpectrum::ZERO;
+    }
+    stats.shadow_rays += 1;
+    if scene.is_occluded(at, &sample) {
+        return SampledSpectrum::ZERO;
+    }
+    // Weigh against the chance that the BSDF would have found this light; it never finds a delta.
+    let light_pdf = samples * sample.pdf;
+    let weight = if sample.is_delta { 1.0 } else { power_heuristic(light_pdf, bsdf_pdf) };
+    let radiance = *throughput * f * arriving * (weight * share / pdf);
+    recorder.contribution(&Contribution {
+        bounces: depth + 1,
+        technique: Technique::LightSample,
+        light,
+        wi: sample.wi,
+        radiance,
+        mis_weight: weight,
+        light_pdf,
+        bsdf_pdf: if sample.is_delta { 0.0 } else { bsdf_pdf },
+    });
+    radiance
+}
