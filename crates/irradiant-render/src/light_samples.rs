@@ -87,15 +87,34 @@ pub(crate) fn direct_light<R: PathRecorder>(
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
-    let mut sum = SampledSpectrum::ZERO;
-    if splits == 1 || scene.lights.as_slice().len() == 1 {
-        if let Some(picked) = scene.light_sampler.sample(&at.reference(), draws.pick)
-            && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
-        {
-            sum = scattered(scene, at, bsdf, throughput, arriving, picked.pmf, 1.0, depth, stats, recorder);
-        }
-        return sum;
+    if splits > 1 && scene.lights.as_slice().len() > 1 {
+        return split_light(scene, at, bsdf, throughput, lambda, draws, prepared, splits, depth, stats, recorder);
     }
+    if let Some(picked) = scene.light_sampler.sample(&at.reference(), draws.pick)
+        && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
+    {
+        return scattered(scene, at, bsdf, throughput, arriving, picked.pmf, 1.0, depth, stats, recorder);
+    }
+    SampledSpectrum::ZERO
+}
+
+/// As [`direct_light`], with several strata.
+// Apart, so that the path loop holds one light sample's code only.
+#[inline(never)]
+fn split_light<R: PathRecorder>(
+    scene: &Scene,
+    at: &Interaction,
+    bsdf: &Bsdf,
+    throughput: &SampledSpectrum,
+    lambda: &Wavelengths,
+    draws: &LightDraws,
+    prepared: Option<PixelRun>,
+    splits: u32,
+    depth: u32,
+    stats: &mut RenderStats,
+    recorder: &mut R,
+) -> SampledSpectrum {
+    let mut sum = SampledSpectrum::ZERO;
     let pick = |stratum| scene.light_sampler.sample(&at.reference(), draws.pick_in_stratum(stratum, splits));
     let mut next = pick(0);
     let mut stratum = 0;

@@ -17,7 +17,7 @@ use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::{Interaction, ReferencePoint};
 use irradiant_core::light::{PixelLine, PixelRun, SampleMode};
-use irradiant_core::sampler::{LightDraws, SampleStream, ScatterDraws};
+use irradiant_core::sampler::{LightDraws, SampleStream};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point2, Ray};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
@@ -203,6 +203,19 @@ impl Walk {
             escape_place: None,
         }
     }
+
+    /// Counts a direction that has been drawn, and what the path carries there.
+    #[inline(always)]
+    pub fn turn(&mut self, bsdf: &Bsdf, sample: &BsdfSample, stats: &mut RenderStats) {
+        self.depth += 1;
+        stats.scatterings += 1;
+        stats.longest_path = stats.longest_path.max(self.depth);
+        self.throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
+        self.any_non_specular |= !sample.lobe.is_specular();
+        if sample.lobe.is_transmissive() {
+            self.roulette_scale *= sample.eta * sample.eta;
+        }
+    }
 }
 
 impl PathIntegrator {
@@ -369,9 +382,9 @@ impl PathIntegrator {
         recorder: &mut R,
     ) -> Option<PathEnd> {
         let draws = stream.scatter(walk.depth);
-        let Some(sample) = draw_direction(at, bsdf, walk, &draws, stats) else {
-            return Some(PathEnd::Absorbed);
-        };
+        let sample = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All);
+        let Some(sample) = sample else { return Some(PathEnd::Absorbed) };
+        walk.turn(bsdf, &sample, stats);
         if walk.throughput.is_black() {
             return Some(PathEnd::Absorbed);
         }
@@ -497,27 +510,6 @@ impl PathIntegrator {
         });
         radiance
     }
-}
-
-/// Draws a direction at a vertex, and what the path carries there. `None` where the draw yields no direction.
-#[inline(always)]
-pub(crate) fn draw_direction(
-    at: &Interaction,
-    bsdf: &Bsdf,
-    walk: &mut Walk,
-    draws: &ScatterDraws,
-    stats: &mut RenderStats,
-) -> Option<BsdfSample> {
-    let sample = bsdf.sample(at.wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All)?;
-    walk.depth += 1;
-    stats.scatterings += 1;
-    stats.longest_path = stats.longest_path.max(walk.depth);
-    walk.throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
-    walk.any_non_specular |= !sample.lobe.is_specular();
-    if sample.lobe.is_transmissive() {
-        walk.roulette_scale *= sample.eta * sample.eta;
-    }
-    Some(sample)
 }
 
 /// Veach's power heuristic (beta = 2) for one sample of each of two techniques: the weight of the one with density `a`.

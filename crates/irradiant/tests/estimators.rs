@@ -154,8 +154,8 @@ fn light_met_directly_mirrored_refracted_and_scattered_is_counted_once() {
 #[test]
 fn splitting_the_choice_of_a_light_changes_nothing_but_noise() {
     // Four lamps of unequal power, a sky and a point light over rough metal and a diffuse floor: the power of some is sampled
-    // always, that of others sometimes, and directions find what light samples find. Seen to fail by 3 to 30 %: without the share of strata, and
-    // with a different number of samples in the weights of the two techniques.
+    // always, that of others sometimes, and directions find what light samples find. Seen to fail: without the share
+    // of strata, and with different numbers of samples in the weights of the two techniques.
     let lamp = |x: f32, y: f32, radius: f32, power: f32| {
         format!(
             "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ {power} {power} {power} ]\nTranslate {x} {y} 0\nShape \"sphere\" \"float radius\" {radius}\nAttributeEnd\n"

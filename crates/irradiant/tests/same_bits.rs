@@ -72,3 +72,15 @@ fn curves_patches_and_mixed_materials() {
         "{HEAD}{VIEW}MakeNamedMaterial \"a\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"b\" \"string type\" \"dielectric\" \"float eta\" 1.3\nMaterial \"mix\" \"string materials\" [ \"a\" \"b\" ] \"float amount\" 0.4\n{FLOOR}Shape \"bilinearmesh\" \"point3 P\" [ -1 0 0  1 0 0  -1 1 1  1 2 0 ]\nMaterial \"thinfilmpaint\"\nShape \"curve\" \"string type\" \"cylinder\" \"float width\" 0.3 \"point3 P\" [ -2 0 -1  -1 2 0  1 -1 0  2 1 -1 ]\n"
     ));
 }
+
+#[test]
+fn shared_paths_of_blocks_that_the_picture_cuts() {
+    let head = HEAD
+        .replace("Integrator \"path\"", "Integrator \"sharedpath\"")
+        .replace("xresolution\" 48", "xresolution\" 42")
+        .replace("yresolution\" 40", "yresolution\" 39")
+        .replace("Film \"rgb\"", "Film \"gbuffer\"");
+    assert_same(&format!(
+        "{head}{VIEW}Material \"diffuse\"\n{FLOOR}Material \"conductor\" \"float roughness\" 0.2\nShape \"sphere\" \"float radius\" 0.6\nMaterial \"diffusetransmission\"\nTranslate 1 0.5 0\nShape \"disk\" \"float radius\" 0.5\n"
+    ));
+}

@@ -25,14 +25,14 @@ mod share;
 use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::light_samples::{direct_light, pick_light};
-use crate::path::{PathIntegrator, Previous, Walk, draw_direction, lights_option, survival_probability};
+use crate::path::{PathIntegrator, Previous, Walk, lights_option, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
 use crate::registry::{IntegratorEntry, LIGHT_SAMPLER};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::{BsdfSample, Bxdf};
+use irradiant_core::bxdf::{BsdfSample, Bxdf, Sides, TransportMode};
 use irradiant_core::film::{FilmTile, PixelBounds};
 use irradiant_core::interaction::{Interaction, ReferencePoint, TextureContext};
-use irradiant_core::sampler::CameraDraws;
+use irradiant_core::sampler::{CameraDraws, ScatterDraws};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
@@ -280,9 +280,10 @@ impl SharedPathIntegrator {
                 direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, splits, 0, stats, &mut NoRecord);
         }
         if gains(&bsdf) {
-            let drawn = draw_direction(&at, &bsdf, &mut walk, &stream.scatter(0), stats);
-            if let Some(sample) = drawn {
-                path.go(scene, &at, &bsdf, &sample, &mut walk, stats);
+            let drawn = draw(&bsdf, at.wo, &stream.scatter(0));
+            if let Some(sample) = &drawn {
+                walk.turn(&bsdf, sample, stats);
+                path.go(scene, &at, &bsdf, sample, &mut walk, stats);
             }
             member.first = Some(First { at, footprint, bsdf });
             if let Some(BsdfSample { pdf, .. }) = drawn {
@@ -390,7 +391,8 @@ impl SharedPathIntegrator {
             }
         }
         let draws = stream.scatter(1);
-        let Some(drawn) = draw_direction(at, bsdf, &mut walk, &draws, stats) else { return };
+        let Some(drawn) = draw(bsdf, at.wo, &draws) else { return };
+        walk.turn(bsdf, &drawn, stats);
         // By one number, not by colours, and never to nothing: others see the surface from elsewhere.
         let importance = walk.roulette_scale * walk.throughput.max_component().max(LEAST_IMPORTANCE);
         let survival = survival_probability(&SampledSpectrum::splat(importance), 1.0, walk.depth);
@@ -447,6 +449,11 @@ fn go_on<R: PathRecorder>(
     let stream = &member.sample.stream;
     path.follow(walk, &mut radiance, None, scene, camera_ray, stream, lambda, &mut [], stats, recorder);
     radiance
+}
+
+/// Draws a direction, if there is one.
+fn draw(bsdf: &Bsdf, wo: Vec3, draws: &ScatterDraws) -> Option<BsdfSample> {
+    bsdf.sample(wo, draws.lobe, draws.uv, TransportMode::Radiance, Sides::All)
 }
 
 /// Whether a vertex of this kind can be shared: directions are drawn with the very density that is stated, and no lobe is a delta.
