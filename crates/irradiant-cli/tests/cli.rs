@@ -285,6 +285,41 @@ fn probe_replays_a_sample() {
     assert_eq!(text, stdout(&folder.run(&["probe", "--pixel", "256,300", "--sample", "5"])));
 }
 
+/// A lamp that is too bright for the film: its samples are refused. Commands that replay them are printed where they do, and places where no
+/// command would.
+#[test]
+fn refused_samples_are_told_with_commands_that_replay_them() {
+    let folder = Folder::new("refused");
+    let sun = "LightSource \"point\" \"rgb I\" [ 1e30 1e30 1e30 ] \"point3 from\" [ 0 0 0 ]\n";
+    folder.write("huge.pbrt", &SCENE.replace("LightSource \"infinite\"\n", sun));
+    let render = |words: &[&str]| {
+        let output = folder.run(&[&["render", "huge.pbrt", "--spp", "2", "-o", "x.exr"], words].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        assert!(stderr(&output).contains("samples were not finite or out of range"), "{}", stderr(&output));
+        stderr(&output)
+    };
+    for words in [&[][..], &["--integrator", "path", "--estimator", "roulette=constant", "--max-depth", "3"]] {
+        let said = render(words);
+        let commands: Vec<&str> = said.lines().filter_map(|l| l.trim().strip_prefix("irradiant ")).collect();
+        assert!(!commands.is_empty(), "{said}");
+        for command in commands {
+            let output = folder.run(&command.split(' ').collect::<Vec<_>>());
+            assert_eq!(code(&output), 0, "{command}: {}", stderr(&output));
+        }
+    }
+    for words in [
+        &["--integrator", "simplepath", "--estimator", "samplebsdf=true"][..],
+        &["--integrator", "direct", "--estimator", "shadow=firsthit"],
+    ] {
+        let said = render(words);
+        assert!(said.contains("the first are\n    pixel ") && said.contains(" sample 0\n"), "{said}");
+        assert!(said.contains("integrator path only") && !said.contains("irradiant probe huge"), "{said}");
+    }
+    // The ball is all that the lamp shines on, and its samples are the refused ones; the others found no light, which is not said of all.
+    let said = render(&[]);
+    assert!(said.contains("none of its paths that were not refused found light"), "{said}");
+}
+
 #[test]
 fn probe_draws_and_speaks_json() {
     let folder = Folder::new("probe-json");
