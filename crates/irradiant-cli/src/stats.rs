@@ -131,7 +131,7 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
         let name = format!("  at {}", scene.material_name(m.material));
         if m.evaluated_as_pbrt {
             text += &missing(&name, &m.missing, PBRT);
-        } else if !(m.missing.z().abs() <= SUSPICIOUS) {
+        } else if m.missing.z().abs() > SUSPICIOUS {
             text += &missing(&name, &m.missing, DISAGREES);
         }
     }
