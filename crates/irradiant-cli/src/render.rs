@@ -203,7 +203,7 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
         irradiant::image::atomic_write(path, text.as_bytes())
             .map_err(|why| Error::Output { path: path.clone(), why })?;
     }
-    report_refused(&rendering, arguments);
+    report_refused(&job, &rendering, arguments);
     let stopped = rendering.stats.stopped_paths;
     if stopped > 0 && !arguments.quiet {
         say!(
@@ -403,39 +403,50 @@ fn report_missing_light(job: &Job) {
 fn report_black(job: &Job, rendering: &Rendering) {
     let b = rendering.film.bounds();
     let pixels = || (b.y0..b.y1).flat_map(|y| (b.x0..b.x1).map(move |x| (x, y)));
-    let splats = rendering.film.has_splats();
-    if !splats
-        && pixels().all(|(x, y)| rendering.film.pixel(x, y).mean() == [0.0; 3])
-        && rendering.film.totals().samples > 0
-    {
+    let (splats, totals) = (rendering.film.has_splats(), rendering.film.totals());
+    if !splats && pixels().all(|(x, y)| rendering.film.pixel(x, y).mean() == [0.0; 3]) && totals.samples > 0 {
+        let whose = if totals.not_finite + totals.out_of_range > 0 { "paths that were not refused" } else { "paths" };
         say!(
-            "warning: the picture is black: none of its paths found light by {}; is there a lamp, does the camera see what it \
+            "warning: the picture is black: none of its {whose} found light by {}; is there a lamp, does the camera see what it \
              lights, and can this estimator find it (see the label above)?",
             job.integrator_choice()
         );
     }
 }
 
-/// Refused samples are never hidden: how many, and where the first ones are.
-fn report_refused(rendering: &Rendering, arguments: &RenderArguments) {
+/// Refused samples are never hidden: how many, and where the first ones are; with the commands that replay them, if `probe` can.
+fn report_refused(job: &Job, rendering: &Rendering, arguments: &RenderArguments) {
     let totals = rendering.film.totals();
     let refused = totals.not_finite + totals.out_of_range;
     if refused == 0 {
         return;
     }
-    say!(
-        "warning: {refused} of {} samples were not finite or out of range and are left out of the means, in {} pixels; replay the first with",
+    let warning = format!(
+        "warning: {refused} of {} samples were not finite or out of range and are left out of the means, in {} pixels",
         totals.samples + refused,
         totals.pixels_with_refused
     );
+    let first = rendering.stats.refused.iter().take(3);
+    if job.path_integrator().is_none() {
+        let places: Vec<String> = first.map(|(x, y, index)| format!("    pixel {x},{y} sample {index}\n")).collect();
+        say!(
+            "{warning}{}\n{}help: irradiant probe follows paths of the integrator path only, which are not those of {}; render with \
+             --integrator path to see whether it refuses samples too, and probe those",
+            if places.is_empty() { "" } else { "; the first are" },
+            places.concat(),
+            job.integrator_choice().name()
+        );
+        return;
+    }
+    say!("{warning}; replay the first with");
     let scene = arguments.scene.as_deref().map_or(String::new(), |p| format!("{} ", p.display()));
     let flags = replay_flags(rendering, arguments);
-    for (x, y, index) in rendering.stats.refused.iter().take(3) {
+    for (x, y, index) in first {
         say!("    irradiant probe {scene}--pixel {x},{y} --sample {index}{flags}");
     }
 }
 
-/// What `probe` must be told to draw the samples of this render.
+/// What `probe` must be told to draw the samples of this render, whose integrator is `path`.
 fn replay_flags(rendering: &Rendering, arguments: &RenderArguments) -> String {
     let picture = &arguments.picture;
     let mut flags = format!(" --spp {} --seed {}", rendering.header.samples_per_pixel, rendering.header.seed);

@@ -93,8 +93,10 @@ const KNOWN: &str = "coats weighted as in pbrt-v4 are evaluated brighter than th
                      on the material is exact\n";
 const DISAGREES: &str = ": how it is sampled and how it is evaluated disagree; please report the scene";
 
+const REFUSED: &str = "; unless lights are so bright that 32-bit floats overflow (3e38; try a smaller \"scale\"), that is a bug: please report the scene\n";
+
 /// The books of energy as lines. Where something is missing, the materials that are known to be evaluated brighter than they are sampled,
-/// and those that are off by more than [`SUSPICIOUS`].
+/// and those that are off by more than [`SUSPICIOUS`], and how many particles were refused.
 pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
     let total = books.emitted.watts.max(f64::MIN_POSITIVE);
     let line = |name: &str, p: &Power| {
@@ -114,6 +116,16 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
         format!("{}  {:+.2} standard errors{why}\n", line.trim_end(), p.z())
     };
     text += &missing("missing", &books.missing, "");
+    if books.refused > 0 {
+        text += &format!(
+            "{:<24} {} of {} particles were not finite and are left out of the books",
+            "refused", books.refused, books.paths
+        );
+        for m in books.by_material.iter().filter(|m| m.refused > 0) {
+            text += &format!(", {} of them first at {}", m.refused, scene.material_name(m.material));
+        }
+        text += REFUSED;
+    }
     let known = books.by_material.iter().any(|m| m.evaluated_as_pbrt);
     for m in &books.by_material {
         let name = format!("  at {}", scene.material_name(m.material));
@@ -140,6 +152,8 @@ pub fn audit_as_json(scene: &Scene, books: &EnergyAudit) -> Value {
     let missing = |m: &MaterialBooks| json!({ "watts": m.missing.watts, "error": m.missing.error, "evaluated_as_pbrt": m.evaluated_as_pbrt });
     json!({
         "particles": books.paths,
+        "refused": books.refused,
+        "refused_by_material": by_material(&|m| json!(m.refused)),
         "emitted": power(&books.emitted),
         "emitted_by_formula": books.emitted_by_formula,
         "absorbed": power(&books.absorbed),

@@ -131,8 +131,8 @@ pub enum SceneHas {
     DeltaLobes,
     /// Lights that rays meet: area lights and environments.
     Lamps,
-    /// Area lights.
-    AreaLights,
+    /// Lights at a place, which something may stand behind: all but environments and distant lights.
+    PlacedLights,
     /// Lamps that nothing can be drawn from: curves.
     CurvedLamps,
     /// Ways to a lamp that light samples do not find: delta lobes; a mix that comes to an interface; lamps that are curves.
@@ -147,7 +147,7 @@ impl SceneHas {
             Self::DeltaLights => lights.iter().any(Light::is_delta),
             Self::DeltaLobes => scene.materials.may_be_specular(),
             Self::Lamps => !lights.iter().all(Light::is_delta),
-            Self::AreaLights => lights.iter().any(|l| matches!(l, Light::Area(_))),
+            Self::PlacedLights => lights.iter().any(|l| l.bounds().is_some()),
             Self::CurvedLamps => {
                 lights.iter().any(|l| matches!(l, Light::Area(lamp) if !lamp.shape.can_be_drawn_from()))
             }

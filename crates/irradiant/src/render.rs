@@ -148,7 +148,8 @@ impl Job {
         (self.integrator.name() == "path").then(|| PathIntegrator::of(self.integrator.options(), self.max_depth))
     }
 
-    /// What the depth limit leaves out, estimated from a few paths without limit (a sixteenth of the picture's, 16384 at most);
+    /// What the depth limit leaves out, estimated from a few paths without limit (a sixteenth of the picture's, at least 256 and at most
+    /// 16384);
     /// `None` without a limit, and of other integrators than `path`.
     pub fn missing_light(&self) -> Option<MissingLight> {
         let samples = self.scene.bounds().area() as u64 * u64::from(self.scene.samples_per_pixel);

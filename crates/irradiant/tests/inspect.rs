@@ -324,6 +324,7 @@ fn densities_of_lights_sum_to_one_over_directions() {
                 ("grazing", Point3::new(6.0, 1.3, 0.4)),
             ] {
                 let sum = light_density_integral(&job.scene, p, Normal3::ZERO, 60_000, 3);
+                assert_eq!(sum.refused(), 0);
                 let (mean, error) = (sum.mean()[0], sum.error()[0]);
                 assert!((mean - 1.0).abs() < 4.9 * error + 1e-3, "{name} {place} {two_sided}: {mean} +- {error}");
                 assert!(6.9 * error < 0.21, "{name} {place}: {error} could hide a wrong density");

@@ -200,6 +200,12 @@ fn labels_name_only_what_the_scene_can_lose() {
     let point = "LightSource \"point\"\n";
     let glass = "Material \"dielectric\"\nShape \"sphere\"\n";
     let hair = "AttributeBegin\nAreaLightSource \"diffuse\"\nShape \"curve\" \"point3 P\" [ 0 0 0  1 0 0  2 0 0  3 0 0 ]\nAttributeEnd\n";
+    let label = |words: &str, world: &str| {
+        let text = film(4) + "Camera \"perspective\"\nWorldBegin\nMaterial \"diffuse\"\nShape \"sphere\"\n" + world;
+        let file = load_text("test", &text, ".").unwrap_or_else(|e| panic!("{e}"));
+        let settings = RenderSettings { integrator: Some(choice(words)), ..RenderSettings::default() };
+        Job::new(&file, &settings).unwrap_or_else(|e| panic!("{e}")).header.estimate
+    };
     let (mirrors, eye) = ("lamps seen by mirrors and glass", "lamps that the eye sees");
     for (words, lost, by) in [
         ("try1", "delta lights", point),
@@ -216,20 +222,28 @@ fn labels_name_only_what_the_scene_can_lose() {
         ("direct", mirrors, hair),
         ("partitioned", mirrors, glass),
         ("iterative", eye, lamp),
-        ("partitioned shadow=anything", "stand in front", lamp),
     ] {
-        let label = |world: &str| {
-            let text = film(4) + "Camera \"perspective\"\nWorldBegin\nMaterial \"diffuse\"\nShape \"sphere\"\n" + world;
-            let file = load_text("test", &text, ".").unwrap_or_else(|e| panic!("{e}"));
-            let settings = RenderSettings { integrator: Some(choice(words)), ..RenderSettings::default() };
-            Job::new(&file, &settings).unwrap_or_else(|e| panic!("{e}")).header.estimate
-        };
+        let label = |world: &str| label(words, world);
         // What it is lost by, and all but that.
         let all = lamp.to_owned() + point + glass;
         let without = if by == hair { lamp.into() } else { all.replace(by, if by == lamp { "" } else { lamp }) };
         let with = if by == hair { hair.to_owned() } else { all };
         assert!(label(&with).contains(lost), "{words}: {}", label(&with));
         assert!(!label(&without).contains(lost), "{words}: {}", label(&without));
+    }
+    // What stands behind a light hides it from a reader who takes shadowIntersection at its word, lamp or point; behind the sky and the sun
+    // nothing stands.
+    for (light, can_be_hidden) in [
+        (lamp, true),
+        (point, true),
+        ("LightSource \"spot\"\n", true),
+        ("LightSource \"distant\"\n", false),
+        ("LightSource \"infinite\"\n", false),
+    ] {
+        for words in ["partitioned shadow=anything emission=power", "direct shadow=anything"] {
+            let said = label(words, light);
+            assert_eq!(said.contains("stand in front"), can_be_hidden, "{words}, {light}: {said}");
+        }
     }
 }
 
@@ -283,6 +297,11 @@ fn shadow_intersection_means_three_things_and_one_is_right() {
     assert!(through.label.contains("biased"), "{}", through.label);
     let dark = by(&both, "direct shadow=anything", 256, 6, 1);
     assert!(is_black(&dark) && dark.label.contains("truncated"), "{}", dark.label);
+    // The walls of a room hide even a point light in its middle, and no depth limit is to blame.
+    let room = film(8) + INSIDE + "WorldBegin\nLightSource \"point\"\n" + &cube([[0.5; 3]; 6]);
+    let hidden = endless(&room, "partitioned shadow=anything emission=power", 16, 7);
+    assert!(is_black(&hidden) && hidden.label.contains("truncated: lights that stand in front"), "{}", hidden.label);
+    assert!(!is_black(&endless(&room, "partitioned emission=power", 16, 7)), "the room is dark");
 }
 
 #[test]

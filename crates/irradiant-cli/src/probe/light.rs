@@ -12,11 +12,15 @@ use std::path::Path;
 fn row(name: &str, e: &Estimate) -> String {
     let [r, g, b] = e.rgb;
     let [er, eg, eb] = e.error;
-    format!("{name:<34} R {r:.6e} +- {er:.1e}  G {g:.6e} +- {eg:.1e}  B {b:.6e} +- {eb:.1e}")
+    let refused = match e.refused {
+        0 => String::new(),
+        n => format!("  ({n} samples were not finite and are left out)"),
+    };
+    format!("{name:<34} R {r:.6e} +- {er:.1e}  G {g:.6e} +- {eg:.1e}  B {b:.6e} +- {eb:.1e}{refused}")
 }
 
 fn estimate(e: &Estimate) -> Value {
-    json!({ "rgb": e.rgb, "error": e.error })
+    json!({ "rgb": e.rgb, "error": e.error, "refused": e.refused })
 }
 
 /// `--incident`
@@ -148,6 +152,10 @@ pub fn residual(
             r.left.error[1].hypot(r.right.error[1]),
             r.left.z(&r.right)[1]
         );
+    }
+    let refused: u64 = found.iter().map(|r| r.left.refused + r.right.refused).sum();
+    if refused > 0 {
+        println!("refused      {refused} samples were not finite and are left out; please report the scene");
     }
     if !lit {
         println!("residual     none: no light was found at any of these points");

@@ -67,9 +67,11 @@ struct Level {
 }
 
 impl Level {
-    /// Which corner of a face a vertex of it is.
+    /// Which corner of a face a vertex of it is. The face has the vertex, once: `topology` has refused degenerate faces, and a face that
+    /// names a vertex twice would make corner 3 of corners 1 and 2.
     fn corner(&self, face: u32, vertex: u32) -> usize {
-        let [_, b, c] = self.faces[face as usize];
+        let [a, b, c] = self.faces[face as usize];
+        debug_assert_eq!([a, b, c].iter().filter(|&&v| v == vertex).count(), 1, "face {face} has vertex {vertex} once");
         usize::from(b == vertex) + 2 * usize::from(c == vertex)
     }
 

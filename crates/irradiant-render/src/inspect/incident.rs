@@ -29,11 +29,13 @@ pub struct Estimate {
     pub rgb: [f64; 3],
     /// Its standard error.
     pub error: [f64; 3],
+    /// Samples that were not finite and are left out.
+    pub refused: u64,
 }
 
 impl Estimate {
     fn of(tally: &Tally<3>) -> Self {
-        Self { rgb: tally.mean(), error: tally.error() }
+        Self { rgb: tally.mean(), error: tally.error(), refused: tally.refused() }
     }
 
     /// Differences from another estimate in joint standard errors; 0 where both are the same number.
@@ -132,9 +134,11 @@ pub fn incident(
             square[c] += (pixel.error()[c] * area).powi(2);
         }
     }
+    let refused = rows.values.iter().flatten().map(Tally::refused).sum();
     let part = |first: usize| Estimate {
         rgb: std::array::from_fn(|c| sum[first + c]),
         error: std::array::from_fn(|c| square[first + c].sqrt()),
+        refused,
     };
     // Of a pixel that the rim cuts, the mean over its part inside.
     let inside = |i: usize, j: usize| {
@@ -167,6 +171,7 @@ pub fn incident(
     let scattered = Estimate {
         rgb: std::array::from_fn(|c| disk.rgb[c] + rest.rgb[c]),
         error: std::array::from_fn(|c| disk.error[c].hypot(rest.error[c])),
+        refused: disk.refused + rest.refused,
     };
     let lambda = scene.sample_wavelengths(0.5);
     Some(Incident {

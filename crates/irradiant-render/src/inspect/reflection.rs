@@ -68,13 +68,18 @@ pub struct Pair {
     pub sky: Sky,
     /// Reflected radiance by Monte Carlo, averaged over four wavelengths, and its standard error.
     pub monte_carlo: (f64, f64),
+    /// Samples that were not finite and are left out; 0 of a right model.
+    pub refused: u64,
     /// By quadrature, and by how much halving its steps still changed it.
     pub quadrature: (f64, f64),
 }
 
 impl Pair {
-    /// Their difference in standard errors, what quadrature does not know included.
+    /// Their difference in standard errors, what quadrature does not know included; infinite where samples were refused.
     pub fn z(&self) -> f64 {
+        if self.refused > 0 {
+            return f64::INFINITY;
+        }
         (self.monte_carlo.0 - self.quadrature.0) / self.monte_carlo.1.hypot(self.quadrature.1)
     }
 }
@@ -95,7 +100,13 @@ pub fn reflection_pairs(wo: Vec3, samples: u32, seed: u64) -> Vec<Pair> {
             }
             let (coarse, fine) = (quadrature(&bxdf, wo, sky, 96), quadrature(&bxdf, wo, sky, 192));
             let monte_carlo = (tally.mean()[0], tally.error()[0]);
-            pairs.push(Pair { model, sky, monte_carlo, quadrature: (fine, (fine - coarse).abs()) });
+            pairs.push(Pair {
+                model,
+                sky,
+                monte_carlo,
+                refused: tally.refused(),
+                quadrature: (fine, (fine - coarse).abs()),
+            });
         }
     }
     pairs

@@ -8,7 +8,7 @@
 //! A27: `scene.shadowIntersection(p, wi)` has no end of the ray among its arguments. A24 and A25 then need it to mean "the first thing
 //! in that direction does not emit", A26 "something is between p and the sampled point". Both are here ([`Shadow`]), and the reading
 //! of a reader who takes it at its word, "something is in that direction": then the lamp is in its own way, and every area light
-//! is dark. Only the second is right in A26: with the first a lamp shines through others, and a wall behind a point light hides it.
+//! is dark, and every point light that has a wall behind it. Only the second is right in A26: with the first a lamp shines through others, and a wall behind a point light hides it.
 
 use super::emission::EmissionRule;
 use super::walk::{Vertex, Walk};
@@ -42,7 +42,7 @@ words! {
         Segment = "segment",
         /// Is the first thing in that direction no emitter? Light behind a light shines through; biased (A24's meaning).
         FirstHit = "firsthit",
-        /// Is anything in that direction? A lamp is in its own way and dark (the call as it is written).
+        /// Is anything in that direction? A lamp is in its own way and dark, and what stands behind a point light hides it (the call as it is written).
         Anything = "anything",
     }
 }
@@ -205,7 +205,7 @@ impl DirectLight {
             Shadow::FirstHit => Some(Limit::Bias("shadow rays end at the first emitter".into())),
             Shadow::Anything => Some(Limit::Unfound(
                 "lights that stand in front of something or of themselves",
-                &[SceneHas::AreaLights],
+                &[SceneHas::PlacedLights],
             )),
         }
     }
