@@ -60,6 +60,12 @@ pub struct Report {
     pub equal_error_spp: Option<f64>,
     /// CPU seconds that they take.
     pub equal_error_cpu_seconds: Option<f64>,
+    /// The same by shared paths.
+    #[serde(default)]
+    pub shared_equal_error_spp: Option<f64>,
+    /// The same by shared paths.
+    #[serde(default)]
+    pub shared_equal_error_cpu_seconds: Option<f64>,
     /// What was left out.
     pub missing: Vec<String>,
 }
@@ -103,6 +109,10 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
     scene::pbrt::link(&folder, &independent, "zsobol", "independent")?;
     let mut contestants: Contestants = vec![
         ("Irradiant rgb".into(), Box::new(ours)),
+        (
+            "Irradiant shared".into(),
+            Box::new(peers::irradiant(setting, &folder, &["--color", "rgb", "--integrator", "sharedpath"])),
+        ),
         ("Irradiant spectral".into(), Box::new(peers::irradiant(setting, &folder, &["--color", "spectral"]))),
         ("Irradiant independent".into(), Box::new(peers::irradiant(setting, &independent, rgb))),
     ];
@@ -110,7 +120,7 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
     let mut points = Vec::new();
     for spp in [1, 2, 4, 8, 16, 32, 64].into_iter().filter(|&s| s <= amount.largest_spp.max(16)) {
         for (name, contestant) in &mut contestants {
-            if spp != 16 && name != "Irradiant rgb" {
+            if spp != 16 && name != "Irradiant rgb" && name != "Irradiant shared" {
                 continue;
             }
             let out = folder.join(format!("{}-{spp}.pfm", name.replace(' ', "-")));
@@ -130,8 +140,11 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
     }
     let find = |name: &str| points.iter().filter(|p| p.name == name).collect::<Vec<_>>();
     let independent_error = find("Irradiant independent").first().map_or(f64::NAN, |p| p.error);
-    let curve: Vec<_> = find("Irradiant rgb").iter().map(|p| (f64::from(p.spp), p.error, p.cpu_seconds)).collect();
-    let crossed = crossing(&curve, independent_error);
+    let crossed_by = |name: &str| {
+        let curve: Vec<_> = find(name).iter().map(|p| (f64::from(p.spp), p.error, p.cpu_seconds)).collect();
+        crossing(&curve, independent_error)
+    };
+    let (crossed, shared) = (crossed_by("Irradiant rgb"), crossed_by("Irradiant shared"));
     Ok(Report {
         machine,
         triangles: scene.triangles(),
@@ -144,6 +157,8 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
         independent_error,
         equal_error_spp: crossed.map(|c| c.0),
         equal_error_cpu_seconds: crossed.map(|c| c.1),
+        shared_equal_error_spp: shared.map(|c| c.0),
+        shared_equal_error_cpu_seconds: shared.map(|c| c.1),
         missing,
     })
 }
