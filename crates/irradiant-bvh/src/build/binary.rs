@@ -185,7 +185,7 @@ impl Side {
         let blocks = (self.counts + Native::splat(LEAF as f32 - 1.0)) * Native::splat(1.0 / LEAF as f32);
         let blocks = Native::from_integers(blocks.round_down());
         let none = self.counts.le(zero) & Native::splat(f32::INFINITY);
-        (x * y + y * z + z * x) * blocks | none
+        ((x * y + y * z + z * x) * blocks) | none
     }
 }
 
