@@ -487,9 +487,6 @@ impl Member<'_> {
 
     /// Scattering at the first vertex for another path's wavelengths.
     fn bsdf_at(&self, scene: &Scene, first: &First, lambda: &Wavelengths) -> Option<Bsdf> {
-        if *lambda == self.lambda {
-            return Some(first.bsdf);
-        }
         let mix = self.sample.stream.mix(0);
         let (at, mut lambda) = (&first.at, *lambda);
         scene.materials.bsdf(at.material, &scene.textures, at, &first.footprint, &mut lambda, mix)

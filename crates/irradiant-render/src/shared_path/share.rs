@@ -44,7 +44,14 @@ pub(super) fn share(scene: &Scene, scratch: &mut Scratch, stats: &mut RenderStat
                 {
                     continue;
                 }
-                let Some(bsdf) = receiver.bsdf_at(scene, first, &giver.lambda) else { continue };
+                let anew;
+                let bsdf = if giver.lambda == receiver.lambda {
+                    &first.bsdf
+                } else {
+                    anew = receiver.bsdf_at(scene, first, &giver.lambda);
+                    let Some(bsdf) = &anew else { continue };
+                    bsdf
+                };
                 let (f, pdf) = bsdf.f_and_pdf(first.at.wo, wi, TransportMode::Radiance);
                 (f * bsdf.abs_cos(wi), pdf, -wi)
             };
