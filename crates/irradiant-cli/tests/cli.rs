@@ -201,6 +201,11 @@ fn exit_codes_tell_who_can_fix_it() {
         (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "t=99"], 2, "--max-depth 97"),
         (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "weighted=false"], 2, "s=1 and t=2"),
         (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "t=1"], 2, "s=0 and t=2"),
+        (
+            &["render", "ok.pbrt", "--integrator", "distribution", "--estimator", "rays=64", "--estimator", "stop=16", "--max-depth", "none"],
+            2,
+            "64^16 after 16 events, for each sample of each pixel; it takes on 65536: try --estimator stop=2, or --estimator rays=2",
+        ),
         (&["render", "ok.pbrt", "--aov", "a=L(D|)E"], 2, "D?"),
         (&["render", "ok.pbrt", "-o", "nowhere/x.exr"], 2, "nowhere"),
         (&["render", "ok.pbrt", "--crop", "0,2,0,1"], 2, "crop"),
@@ -452,6 +457,20 @@ fn a_time_limit_ends_a_long_render() {
     assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
 }
 
+#[test]
+fn pixels_that_no_sample_came_to_are_told_of() {
+    let folder = Folder::new("holes");
+    // More pixels than any one thread samples in this time.
+    let flags = ["--resolution", "512x512", "--time", "1ms", "--threads", "1"];
+    let output = folder.run(&[&["render", "-o", "x.pfm", "--stats", "s.json"], &flags[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("of 262144 pixels (") && said.contains("have no sample"), "{said}");
+    let stats: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.0.join("s.json")).expect("written")).expect("JSON");
+    assert!(stats["pixels_without_samples"].as_u64().is_some_and(|n| n > 0 && n <= 262_144), "{stats}");
+}
+
 /// Waits for a render to be under way, stops it as Ctrl-C (`INT`) or a scheduler (`TERM`) does.
 #[cfg(unix)]
 fn stopped_render(folder: &Folder, signals: &[&str]) -> (i32, String) {
@@ -464,10 +483,9 @@ fn stopped_render(folder: &Folder, signals: &[&str]) -> (i32, String) {
     let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().expect("piped")));
     lines.next().expect("a line").expect("text");
     std::thread::sleep(std::time::Duration::from_millis(500));
-    for signal in signals {
-        let sent = Command::new("kill").args([signal, &child.id().to_string()[..]]).status();
-        assert!(sent.expect("kill runs").success());
-    }
+    // One shell, so that nothing comes between them.
+    let kills: Vec<String> = signals.iter().map(|signal| format!("kill {signal} {}", child.id())).collect();
+    assert!(Command::new("sh").args(["-c", &kills.join("; ")]).status().expect("a shell").success());
     let said: Vec<String> = lines.map_while(Result::ok).collect();
     // No status (it was killed) is no code of ours.
     (child.wait().expect("ends").code().unwrap_or(-1), said.join("\n"))
@@ -485,6 +503,40 @@ fn an_interrupt_writes_the_picture_so_far_and_ends_with_130() {
         let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
         assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_an_audit_and_the_picture_is_there() {
+    let folder = Folder::new("audit-interrupt");
+    let mut child = folder
+        .command(&[&["render", "-q", "-o", "x.pfm", "--audit=100000000"], &SMALL[..]].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    // The picture is written before the audit begins.
+    while !folder.0.join("x.pfm").exists() {
+        assert!(child.try_wait().expect("can be asked").is_none(), "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs").success());
+    let output = child.wait_with_output().expect("ends");
+    assert_eq!(code(&output), 130, "{}", stderr(&output));
+    assert!(stderr(&output).contains("of 100000000 particles; the picture has been written"), "{}", stderr(&output));
+    // The books of the particles so far.
+    assert!(stdout(&output).contains("emitted"), "{}", stdout(&output));
+}
+
+/// As GNU timeout does: it signals its child, and at once the group that the child is in.
+#[cfg(unix)]
+#[test]
+fn two_signals_at_once_are_one_wish() {
+    let folder = Folder::new("timeout");
+    let (code, said) = stopped_render(&folder, &["-TERM", "-INT"]);
+    assert_eq!(code, 130, "{said}");
+    assert!(said.contains("stopped early") && folder.names() == ["x.exr"], "{said}");
 }
 
 #[test]
