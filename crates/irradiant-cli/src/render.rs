@@ -11,6 +11,7 @@ use irradiant::image::FileFormat;
 use irradiant::renderer::Progress;
 use irradiant::renderer::inspect::{AuditSettings, AuditWatch, EnergyAudit, watched_audit};
 use irradiant::{Aov, Error, IntegratorChoice, Job, MaxDepth, Rendering, SceneFile};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -27,7 +28,7 @@ pub struct RenderArguments {
     #[command(flatten)]
     pub picture: PictureOptions,
     /// Stop after this time (60s, 5m, 1h) with what is there
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse_duration)]
     time: Option<Duration>,
     /// How rays leave surfaces: robust, or, to see what it is good for, none, epsilon=E, skip-id, project or fp64 (by the
     /// integrator selfintersection; biased)
@@ -37,7 +38,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "PATHS", num_args = 0..=1, require_equals = true, default_missing_value = "200000", value_parser = parse_audit)]
     audit: Option<u64>,
     /// Threads [default: one per core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
     /// Brighten display pictures (.png, .qoi, .jpg) by this many stops; .exr, .pfm and .hdr stay as they are
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
@@ -49,7 +50,7 @@ pub struct RenderArguments {
     /// Write the picture and its layers, small and labelled, on one sheet
     #[arg(long, value_name = "FILE.png")]
     contact_sheet: Option<PathBuf>,
-    /// A quick look: a quarter of the pixels, at most 16 samples each
+    /// A quick look: a quarter of the pixels, at most 16 samples each; --resolution and --spp stay as they are said
     #[arg(long)]
     preview: bool,
     /// Write seconds, CPU seconds, rays, memory as JSON
@@ -135,10 +136,8 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
         settings.integrator = Some(choice.clone());
     }
     if arguments.preview {
-        let full = settings.resolution.unwrap_or(file.desc.film.resolution.value);
-        settings.resolution = Some(full.map(|n| (n / 2).max(1)));
-        let spp = settings.samples_per_pixel.unwrap_or(file.desc.sampler.samples_per_pixel.value);
-        settings.samples_per_pixel = Some(spp.min(16));
+        settings.resolution.get_or_insert(file.desc.film.resolution.value.map(|n| (n / 2).max(1)));
+        settings.samples_per_pixel.get_or_insert(file.desc.sampler.samples_per_pixel.value.min(16));
     }
     let job = Job::new(&file, &settings)?;
     clock.lap("compile");
@@ -302,7 +301,12 @@ fn wait(elapsed: Duration) -> Duration {
 }
 
 /// Keeps the books with progress, or says why there are none; a signal ends it with the particles so far, and the second value says so.
-fn watch_audit(job: &Job, settings: &AuditSettings, interrupts: &Interrupts, quiet: bool) -> (Option<EnergyAudit>, bool) {
+fn watch_audit(
+    job: &Job,
+    settings: &AuditSettings,
+    interrupts: &Interrupts,
+    quiet: bool,
+) -> (Option<EnergyAudit>, bool) {
     let watch = AuditWatch::default();
     let started = Instant::now();
     let mut reporter = Reporter::new(quiet, "audit ");
@@ -311,7 +315,8 @@ fn watch_audit(job: &Job, settings: &AuditSettings, interrupts: &Interrupts, qui
         while !books.is_finished() {
             let elapsed = started.elapsed();
             let samples_done = watch.done.load(Ordering::Relaxed);
-            reporter.update(&Progress { samples_done, samples_total: settings.paths, elapsed, finished: false }, || None);
+            reporter
+                .update(&Progress { samples_done, samples_total: settings.paths, elapsed, finished: false }, || None);
             if interrupts.asked() {
                 watch.stop.store(true, Ordering::Relaxed);
             }
@@ -345,6 +350,7 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
     for path in paths.iter().chain(&arguments.stats).chain(&arguments.contact_sheet) {
         check_folder(path)?;
     }
+    refuse_doubles(paths.iter().chain(&arguments.stats).chain(&arguments.contact_sheet))?;
     if let Some(path) = &arguments.contact_sheet
         && FileFormat::from_name(&path.to_string_lossy()) != Some(FileFormat::Png)
     {
@@ -373,6 +379,21 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
         }
     }
     Ok(paths)
+}
+
+/// That no two of these are one file, of which only the last would stay. Their folders exist.
+fn refuse_doubles<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Result<(), Error> {
+    let mut seen = HashSet::new();
+    for path in paths {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !seen.insert((folder.canonicalize().ok(), path.file_name())) {
+            return Err(Error::Settings(format!(
+                "{}: named twice, and one file cannot be both; leave one out or give it another name",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// That a file can be made where `path` wants to be.
@@ -416,16 +437,13 @@ fn report_layers(rendering: &Rendering) {
 
 /// Paths with light beyond the depth limit from which its amount and its error can be told.
 const ENOUGH: u64 = 16;
+/// Standard error over what it is of, beyond which a number tells nothing.
+const VAGUE: f64 = 0.3;
 
-/// What a depth limit leaves out.
+/// What a depth limit leaves out, where so few paths can tell; that there is a limit stands in the label.
 fn report_missing_light(job: &Job) {
     let (Some(max_depth), Some(missing)) = (job.max_depth(), job.missing_light()) else { return };
-    if missing.found < ENOUGH {
-        say!(
-            "maxdepth {max_depth}: of {} paths without limit {} found light beyond it, too few to say how much it leaves out",
-            missing.paths,
-            missing.found
-        );
+    if missing.found < ENOUGH || missing.standard_error > VAGUE * missing.share {
         return;
     }
     say!(
