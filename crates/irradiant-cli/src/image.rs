@@ -50,6 +50,13 @@ pub fn run(arguments: &ImageArguments) -> Exit {
         Tone::Aces => ToneCurve::Aces,
     };
     let tone = ToneOptions { exposure: arguments.exposure, curve, ..ToneOptions::default() };
+    let linear = matches!(format, FileFormat::Exr | FileFormat::Pfm | FileFormat::Hdr);
+    if linear && (!matches!(arguments.tone, Tone::None) || arguments.exposure != 0.0) {
+        say!(
+            "warning: {} keeps linear values: --tone and --exposure are for pictures for display (.png, .qoi, .jpg) and change nothing here",
+            arguments.output.display()
+        );
+    }
     let converted = match format {
         FileFormat::Exr | FileFormat::Pfm | FileFormat::Hdr => Ok(image),
         _ => to_srgb8(&image, &tone),

@@ -6,6 +6,7 @@ mod compare;
 mod exit;
 mod image;
 mod integrators;
+mod interrupts;
 mod options;
 mod probe;
 mod progress;

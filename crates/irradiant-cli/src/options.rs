@@ -8,16 +8,16 @@ use std::time::Duration;
 #[derive(Args, Clone, Debug)]
 pub struct PictureOptions {
     /// Samples per pixel [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub spp: Option<u32>,
     /// Seed of the random numbers; pictures of different seeds are independent
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: Option<u64>,
     /// Size of the picture in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
+    #[arg(long, value_name = "WxH", allow_hyphen_values = true, value_parser = parse_resolution)]
     pub resolution: Option<[u32; 2]>,
     /// The part to render, as fractions of width and height
-    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = parse_crop)]
+    #[arg(long, value_name = "X0,X1,Y0,Y1", allow_hyphen_values = true, value_parser = parse_crop)]
     pub crop: Option<Crop>,
     /// Integrator by name, "help" for a list [default: the scene's]
     #[arg(long, value_name = "NAME", value_parser = parse_integrator)]
@@ -26,13 +26,13 @@ pub struct PictureOptions {
     #[arg(long, value_name = "KEY=VALUE")]
     pub estimator: Vec<String>,
     /// Scattering events at most, or "none" for an unbiased picture [default: the scene's, else pbrt's 5]
-    #[arg(long, value_name = "N|none", value_parser = parse_max_depth)]
+    #[arg(long, value_name = "N|none", allow_hyphen_values = true, value_parser = parse_max_depth)]
     pub max_depth: Option<MaxDepth>,
     /// Basis of colour
     #[arg(long, value_name = "BASIS", value_enum, default_value = "spectral")]
     pub color: Color,
     /// Memory that the picture's sums may take, e.g. 16G; larger films are refused before anything is reserved
-    #[arg(long, value_name = "SIZE", default_value = "4G", value_parser = parse_size)]
+    #[arg(long, value_name = "SIZE", default_value = "4G", allow_hyphen_values = true, value_parser = parse_size)]
     pub max_film_memory: u64,
     /// Scene content that is not honoured is an error
     #[arg(long)]
@@ -126,8 +126,13 @@ fn parse_integrator(text: &str) -> Result<IntegratorArgument, String> {
 fn parse_max_depth(text: &str) -> Result<MaxDepth, String> {
     match text {
         "none" => Ok(MaxDepth::None),
-        _ => text.parse().map(MaxDepth::Limit).map_err(|_| "a whole number or \"none\"".into()),
+        _ => text.parse().map(MaxDepth::Limit).map_err(|_| "write a whole number, 0 or more, or \"none\"".into()),
     }
+}
+
+/// `--seed`
+pub fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("write a whole number from 0 to {}", u64::MAX))
 }
 
 /// Stops.
@@ -141,6 +146,9 @@ pub fn parse_exposure(text: &str) -> Result<f32, String> {
 
 /// `500M`, `16G`, `16GiB`: powers of 1024.
 fn parse_size(text: &str) -> Result<u64, String> {
+    if text.starts_with('-') {
+        return Err("memory is not negative: write it as 500M or 16G".into());
+    }
     let split = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
     let shift = match unit.trim().trim_end_matches("iB").trim_end_matches('B') {
@@ -157,6 +165,9 @@ fn parse_size(text: &str) -> Result<u64, String> {
 
 /// `90`, `90s`, `1.5m`, `2h`, `500ms`.
 pub fn parse_duration(text: &str) -> Result<Duration, String> {
+    if text.starts_with('-') {
+        return Err("not a time that can pass: write it as 60s, 5m, 1h or 500ms".into());
+    }
     let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
     let number: f64 = number.parse().map_err(|_| "write it as 60s, 5m, 1h or 500ms".to_string())?;

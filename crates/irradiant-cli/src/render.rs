@@ -1,17 +1,19 @@
 //! `irradiant render`: a scene in, a picture out.
 
 use crate::exit::Exit;
+use crate::interrupts::Interrupts;
 use crate::options::{Color, PictureOptions, parse_duration, parse_exposure};
 use crate::progress::{Reporter, short_count, short_time};
 use crate::say::say;
 use crate::stats::{self, Clock};
 use clap::Args;
 use irradiant::image::FileFormat;
-use irradiant::renderer::inspect::{AuditSettings, audit};
+use irradiant::renderer::Progress;
+use irradiant::renderer::inspect::{AuditSettings, AuditWatch, EnergyAudit, watched_audit};
 use irradiant::{Aov, Error, IntegratorChoice, Job, MaxDepth, Rendering, SceneFile};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Render a scene (pbrt-v4 text; "-" reads standard input; none: the built-in Cornell box)
@@ -26,7 +28,7 @@ pub struct RenderArguments {
     #[command(flatten)]
     pub picture: PictureOptions,
     /// Stop after this time (60s, 5m, 1h) with what is there
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse_duration)]
     time: Option<Duration>,
     /// How rays leave surfaces: robust, or, to see what it is good for, none, epsilon=E, skip-id, project or fp64 (by the
     /// integrator selfintersection; biased)
@@ -36,7 +38,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "PATHS", num_args = 0..=1, require_equals = true, default_missing_value = "200000", value_parser = parse_audit)]
     audit: Option<u64>,
     /// Threads [default: one per core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
     /// Brighten display pictures (.png, .qoi, .jpg) by this many stops; .exr, .pfm and .hdr stay as they are
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
@@ -48,7 +50,7 @@ pub struct RenderArguments {
     /// Write the picture and its layers, small and labelled, on one sheet
     #[arg(long, value_name = "FILE.png")]
     contact_sheet: Option<PathBuf>,
-    /// A quick look: a quarter of the pixels, at most 16 samples each
+    /// A quick look: a quarter of the pixels, at most 16 samples each; --resolution and --spp stay as they are said
     #[arg(long)]
     preview: bool,
     /// Write seconds, CPU seconds, rays, memory as JSON
@@ -134,10 +136,8 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
         settings.integrator = Some(choice.clone());
     }
     if arguments.preview {
-        let full = settings.resolution.unwrap_or(file.desc.film.resolution.value);
-        settings.resolution = Some(full.map(|n| (n / 2).max(1)));
-        let spp = settings.samples_per_pixel.unwrap_or(file.desc.sampler.samples_per_pixel.value);
-        settings.samples_per_pixel = Some(spp.min(16));
+        settings.resolution.get_or_insert(file.desc.film.resolution.value.map(|n| (n / 2).max(1)));
+        settings.samples_per_pixel.get_or_insert(file.desc.sampler.samples_per_pixel.value.min(16));
     }
     let job = Job::new(&file, &settings)?;
     clock.lap("compile");
@@ -157,7 +157,8 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
         );
     }
 
-    let Watched { rendering, interrupted, worker_panicked } = watch(&job, arguments.quiet);
+    let interrupts = Interrupts::listen();
+    let Watched { rendering, interrupted, worker_panicked } = watch(&job, &interrupts, arguments.quiet);
     clock.lap("render");
     // One that cannot be written must not cost the others.
     let mut failed = None;
@@ -181,21 +182,26 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     }
     clock.lap("write");
 
-    let audit = arguments.audit.and_then(|paths| {
-        let settings = AuditSettings { paths, max_depth: job.max_depth(), seed: job.header.seed };
-        let books = audit(&job.scene, &settings);
-        clock.lap("audit");
-        books
-    });
-    match (&audit, arguments.audit) {
-        (Some(books), _) => print!("{}", stats::audit_in_words(&job.scene, books)),
-        (None, Some(_)) => say!("audit: there is no light in the scene"),
-        (None, None) => {}
+    let (mut audit, mut interrupted) = (None, interrupted);
+    if let Some(paths) = arguments.audit {
+        if interrupts.asked() {
+            say!("the audit is left out");
+            interrupted = true;
+        } else {
+            let settings = AuditSettings { paths, max_depth: job.max_depth(), seed: job.header.seed };
+            let (books, stopped) = watch_audit(&job, &settings, &interrupts, arguments.quiet);
+            (audit, interrupted) = (books, interrupted || stopped);
+            clock.lap("audit");
+        }
+    }
+    if let Some(books) = &audit {
+        print!("{}", stats::audit_in_words(&job.scene, books));
     }
     if let Some(path) = &arguments.stats {
         let threads = job_threads(arguments);
         let command: Vec<String> = std::env::args().collect();
         let mut json = clock.json(&rendering.stats, threads, &command);
+        json["pixels_without_samples"] = rendering.film.totals().pixels_without_samples.into();
         if let Some(books) = &audit {
             json["audit"] = stats::audit_as_json(&job.scene, books);
         }
@@ -213,6 +219,13 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     }
     if let (false, Some([least, most])) = (arguments.quiet, rendering.header.samples_taken) {
         say!("stopped early: {least} to {most} of {} samples per pixel", rendering.header.samples_per_pixel);
+        let (none, all) = (rendering.film.totals().pixels_without_samples, rendering.film.bounds().area());
+        if none > 0 {
+            say!(
+                "warning: {none} of {all} pixels ({:.1} %) have no sample and show nothing; a longer --time, a smaller --resolution or --preview helps",
+                100.0 * none as f64 / all as f64
+            );
+        }
     }
     if !arguments.quiet {
         report_layers(&rendering);
@@ -252,38 +265,27 @@ struct Watched {
     worker_panicked: bool,
 }
 
-/// Renders with progress; Ctrl-C ends early with the picture so far, a second one at once.
-fn watch(job: &Job, quiet: bool) -> Watched {
-    let interrupts = Arc::new(AtomicU32::new(0));
-    let counter = Arc::clone(&interrupts);
-    // A handler that cannot be set (there is one already, in an embedding process) only means no early picture.
-    let _ = ctrlc::set_handler(move || {
-        if counter.fetch_add(1, Ordering::Relaxed) > 0 {
-            std::process::exit(Exit::Interrupted as i32);
-        }
-    });
+/// Renders with progress; Ctrl-C ends early with the picture so far.
+fn watch(job: &Job, interrupts: &Interrupts, quiet: bool) -> Watched {
     let session = job.start();
-    let mut reporter = Reporter::new(quiet);
-    let (mut noise, mut noise_at) = (None, Instant::now());
+    let mut reporter = Reporter::new(quiet, "");
     let mut interrupted = false;
     loop {
         let progress = session.progress();
         if progress.finished {
             break;
         }
-        if reporter.wants_noise() && (noise.is_none() || noise_at.elapsed() > Duration::from_secs(2)) {
+        reporter.update(&progress, || {
             let totals = session.totals();
             // With one sample a pixel has no variance to speak of.
-            noise = (totals.min_count >= 2).then_some(totals.relative_error);
-            noise_at = Instant::now();
-        }
-        reporter.update(&progress, noise);
-        if !interrupted && interrupts.load(Ordering::Relaxed) > 0 {
+            (totals.min_count >= 2).then_some(totals.relative_error)
+        });
+        if !interrupted && interrupts.asked() {
             interrupted = true;
             session.cancel();
             say!("stopping; writing the picture so far (Ctrl-C again quits without it)");
         }
-        std::thread::sleep(Duration::from_millis(if progress.elapsed.as_millis() < 500 { 2 } else { 25 }));
+        std::thread::sleep(wait(progress.elapsed));
     }
     reporter.finish();
     let finished = session.wait();
@@ -291,6 +293,46 @@ fn watch(job: &Job, quiet: bool) -> Watched {
     // One that came when all samples were taken cost nothing.
     let interrupted = interrupted && rendering.header.samples_taken.is_some();
     Watched { rendering, interrupted, worker_panicked: finished.worker_panicked }
+}
+
+/// How long to look away.
+fn wait(elapsed: Duration) -> Duration {
+    Duration::from_millis(if elapsed.as_millis() < 500 { 2 } else { 25 })
+}
+
+/// Keeps the books with progress, or says why there are none; a signal ends it with the particles so far, and the second value says so.
+fn watch_audit(
+    job: &Job,
+    settings: &AuditSettings,
+    interrupts: &Interrupts,
+    quiet: bool,
+) -> (Option<EnergyAudit>, bool) {
+    let watch = AuditWatch::default();
+    let started = Instant::now();
+    let mut reporter = Reporter::new(quiet, "audit ");
+    let books = std::thread::scope(|scope| {
+        let books = scope.spawn(|| watched_audit(&job.scene, settings, &watch));
+        while !books.is_finished() {
+            let elapsed = started.elapsed();
+            let samples_done = watch.done.load(Ordering::Relaxed);
+            reporter
+                .update(&Progress { samples_done, samples_total: settings.paths, elapsed, finished: false }, || None);
+            if interrupts.asked() {
+                watch.stop.store(true, Ordering::Relaxed);
+            }
+            std::thread::sleep(wait(elapsed));
+        }
+        books.join().unwrap_or_else(|why| std::panic::resume_unwind(why))
+    });
+    reporter.finish();
+    let traced = watch.done.load(Ordering::Relaxed);
+    let stopped = watch.stop.load(Ordering::Relaxed) && traced < settings.paths;
+    if stopped {
+        say!("the audit was stopped after {traced} of {} particles; the picture has been written", settings.paths);
+    } else if books.is_none() {
+        say!("audit: there is no light in the scene");
+    }
+    (books, stopped)
 }
 
 /// Where to write: as asked for, else the scene's own name in the current directory, EXR and PNG.
@@ -308,6 +350,7 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
     for path in paths.iter().chain(&arguments.stats).chain(&arguments.contact_sheet) {
         check_folder(path)?;
     }
+    refuse_doubles(paths.iter().chain(&arguments.stats).chain(&arguments.contact_sheet))?;
     if let Some(path) = &arguments.contact_sheet
         && FileFormat::from_name(&path.to_string_lossy()) != Some(FileFormat::Png)
     {
@@ -336,6 +379,21 @@ fn output_paths(arguments: &RenderArguments, file: &SceneFile) -> Result<Vec<Pat
         }
     }
     Ok(paths)
+}
+
+/// That no two of these are one file, of which only the last would stay. Their folders exist.
+fn refuse_doubles<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Result<(), Error> {
+    let mut seen = HashSet::new();
+    for path in paths {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !seen.insert((folder.canonicalize().ok(), path.file_name())) {
+            return Err(Error::Settings(format!(
+                "{}: named twice, and one file cannot be both; leave one out or give it another name",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// That a file can be made where `path` wants to be.
@@ -379,16 +437,13 @@ fn report_layers(rendering: &Rendering) {
 
 /// Paths with light beyond the depth limit from which its amount and its error can be told.
 const ENOUGH: u64 = 16;
+/// Standard error over what it is of, beyond which a number tells nothing.
+const VAGUE: f64 = 0.3;
 
-/// What a depth limit leaves out.
+/// What a depth limit leaves out, where so few paths can tell; that there is a limit stands in the label.
 fn report_missing_light(job: &Job) {
     let (Some(max_depth), Some(missing)) = (job.max_depth(), job.missing_light()) else { return };
-    if missing.found < ENOUGH {
-        say!(
-            "maxdepth {max_depth}: of {} paths without limit {} found light beyond it, too few to say how much it leaves out",
-            missing.paths,
-            missing.found
-        );
+    if missing.found < ENOUGH || missing.standard_error > VAGUE * missing.share {
         return;
     }
     say!(

@@ -1,6 +1,7 @@
 //! Where the time went and what was done: for `--stats` and the closing line. None of it goes into picture files.
 
 use cpu_time::ProcessTime;
+use irradiant::core::interaction::MaterialId;
 use irradiant::core::scene::Scene;
 use irradiant::renderer::RenderStats;
 use irradiant::renderer::inspect::EnergyAudit;
@@ -106,8 +107,14 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
     text += &line("emitted", &books.emitted);
     text += &format!("{:<24} {:>14.6e} W\n", "  by the lights' formula", books.emitted_by_formula);
     text += &line("absorbed", &books.absorbed);
+    // A number tells materials of one name (that of their kind, where they have none) apart.
+    let all: Vec<&str> = (0..scene.materials.len() as u32).map(|i| scene.material_name(MaterialId(i))).collect();
+    let name_of = |id: MaterialId| {
+        let name = scene.material_name(id);
+        if all.iter().filter(|other| **other == name).count() > 1 { format!("{name} #{}", id.0) } else { name.into() }
+    };
     for m in &books.by_material {
-        text += &line(&format!("  by {}", scene.material_name(m.material)), &m.absorbed);
+        text += &line(&format!("  by {}", name_of(m.material)), &m.absorbed);
     }
     text += &line("escaped", &books.escaped);
     text += &line("cut off by the limit", &books.cut_off);
@@ -128,7 +135,7 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
     }
     let known = books.by_material.iter().any(|m| m.evaluated_as_pbrt);
     for m in &books.by_material {
-        let name = format!("  at {}", scene.material_name(m.material));
+        let name = format!("  at {}", name_of(m.material));
         if m.evaluated_as_pbrt {
             text += &missing(&name, &m.missing, PBRT);
         } else if m.missing.z().abs() > SUSPICIOUS {

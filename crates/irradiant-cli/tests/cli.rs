@@ -201,6 +201,22 @@ fn exit_codes_tell_who_can_fix_it() {
         (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "t=99"], 2, "--max-depth 97"),
         (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "weighted=false"], 2, "s=1 and t=2"),
         (&["render", "ok.pbrt", "--integrator", "bdpt", "--estimator", "t=1"], 2, "s=0 and t=2"),
+        (
+            &[
+                "render",
+                "ok.pbrt",
+                "--integrator",
+                "distribution",
+                "--estimator",
+                "rays=64",
+                "--estimator",
+                "stop=16",
+                "--max-depth",
+                "none",
+            ],
+            2,
+            "64^16 after 16 events, for each sample of each pixel; it takes on 65536: try --estimator stop=2, or --estimator rays=2",
+        ),
         (&["render", "ok.pbrt", "--aov", "a=L(D|)E"], 2, "D?"),
         (&["render", "ok.pbrt", "-o", "nowhere/x.exr"], 2, "nowhere"),
         (&["render", "ok.pbrt", "--crop", "0,2,0,1"], 2, "crop"),
@@ -208,6 +224,23 @@ fn exit_codes_tell_who_can_fix_it() {
         (&["compare", "gone.exr", "gone.exr"], 66, "gone.exr"),
         (&["compare", "ok.pbrt", "ok.pbrt"], 65, "ok.pbrt"),
         (&["frobnicate"], 2, "Usage"),
+        (&["render", "missing.pbrt"], 66, "cannot read missing.pbrt: there is no such file\n"),
+        (&["compare", "gone.exr", "gone.exr"], 66, "cannot read gone.exr: there is no such file\n"),
+        (&["image", "gone.exr", "-o", "x.png"], 66, "cannot read gone.exr: there is no such file\n"),
+        (&["render", "ok.pbrt", "--spp", "-1"], 2, "'-1' for '--spp <N>': -1 is not in 1..="),
+        (&["render", "ok.pbrt", "--seed", "-1"], 2, "'-1' for '--seed <N>': write a whole number from 0 to"),
+        (
+            &["render", "ok.pbrt", "--max-depth", "-1"],
+            2,
+            "'-1' for '--max-depth <N|none>': write a whole number, 0 or more",
+        ),
+        (&["render", "ok.pbrt", "--time", "-3s"], 2, "'-3s' for '--time <TIME>': not a time that can pass"),
+        (&["render", "ok.pbrt", "--threads", "-2"], 2, "'-2' for '--threads <N>'"),
+        (&["render", "ok.pbrt", "--crop", "-0.1,1,0,1"], 2, "needs 0 <= x0"),
+        (&["probe", "ok.pbrt", "--pixel", "1,1", "--sample", "-1"], 2, "'-1' for '--sample <I>'"),
+        (&["teach", "--seed", "-1"], 2, "'-1' for '--seed <N>'"),
+        (&["render", "ok.pbrt", "-o", "x.png", "-o", "./x.png"], 2, "./x.png: named twice"),
+        (&["render", "ok.pbrt", "-o", "x.png", "--contact-sheet", "x.png"], 2, "x.png: named twice"),
     ] {
         let output = folder.run(arguments);
         assert_eq!(code(&output), expected, "{arguments:?}: {}", stderr(&output));
@@ -406,6 +439,12 @@ fn the_books_of_energy_are_printed_and_kept() {
     let rare = ["render", "-q", "-o", "r.exr", "--spp", "1", "--resolution", "4x4", "--seed", "5", "--audit"];
     let said = stdout(&folder.run(&rare));
     assert!(said.contains("standard errors") && !said.contains("NaN") && !said.contains("refused"), "{said}");
+    // Materials of one name are told apart.
+    let two = "Material \"diffuse\"\nShape \"sphere\"\nTranslate 3 0 0\nMaterial \"diffuse\" \"rgb reflectance\" [ .1 .1 .1 ]\nShape";
+    folder.write("two.pbrt", &SCENE.replace("Shape", two));
+    let said = stdout(&folder.run(&["render", "two.pbrt", "-q", "-o", "c.exr", "--audit=2000"]));
+    let names: Vec<&str> = said.lines().filter(|l| l.starts_with("  by diffuse #")).map(|l| &l[..15]).collect();
+    assert!(names.len() == 2 && names[0] != names[1], "{said}");
     // The picture is the same as without.
     folder.run(&[&["render", "-q", "-o", "b.exr"], &SMALL[..]].concat());
     let read = |name: &str| std::fs::read(folder.0.join(name)).expect("written");
@@ -487,6 +526,10 @@ fn images_are_converted() {
         assert_eq!(code(&output), 0, "{}", stderr(&output));
     }
     assert_eq!(folder.names().len(), 6);
+    // Linear values stay as they are, and whoever asks for a curve is told so.
+    let output = folder.run(&["image", "a.exr", "-o", "t.exr", "--tone", "aces"]);
+    assert!(code(&output) == 0 && stderr(&output).contains("t.exr keeps linear values"), "{}", stderr(&output));
+    assert_eq!(stderr(&folder.run(&["image", "a.exr", "-o", "t.png", "--tone", "aces"])), "");
 }
 
 #[test]
@@ -497,6 +540,50 @@ fn a_time_limit_ends_a_long_render() {
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
     assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
+}
+
+#[test]
+fn pixels_that_no_sample_came_to_are_told_of() {
+    let folder = Folder::new("holes");
+    // More pixels than any one thread samples in this time.
+    let flags = ["--resolution", "512x512", "--time", "1ms", "--threads", "1"];
+    let output = folder.run(&[&["render", "-o", "x.pfm", "--stats", "s.json"], &flags[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("of 262144 pixels (") && said.contains("have no sample"), "{said}");
+    let stats: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.0.join("s.json")).expect("written")).expect("JSON");
+    assert!(stats["pixels_without_samples"].as_u64().is_some_and(|n| n > 0 && n <= 262_144), "{stats}");
+}
+
+#[test]
+fn a_preview_is_small_but_for_what_is_said() {
+    let folder = Folder::new("preview");
+    folder.write("s.pbrt", SCENE);
+    let label =
+        |flags: &[&str]| stderr(&folder.run(&[&["render", "s.pbrt", "--preview", "-o", "x.png"], flags].concat()));
+    assert!(label(&[]).contains("s.pbrt: 8 x 6 pixels, 16 samples each"), "{}", label(&[]));
+    let said = label(&["--resolution", "20x20", "--spp", "17"]);
+    assert!(said.contains("s.pbrt: 20 x 20 pixels, 17 samples each"), "{said}");
+}
+
+#[test]
+fn a_crop_is_compared_with_the_whole_where_both_are() {
+    let folder = Folder::new("part");
+    for (crop, name) in [("0,1,0,1", "all.exr"), ("0.5,1,0.25,1", "part.exr"), ("0,0.25,0,1", "left.exr")] {
+        let output = folder.run(&[&["render", "--crop", crop, "-o", name], &SMALL[..]].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+    }
+    let output = folder.run(&["compare", "part.exr", "all.exr", "--json"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(value["mse"], 0.0);
+    assert_eq!(value["part"], serde_json::json!({ "x": 12, "y": 6, "width": 12, "height": 18 }));
+    // The worst tile lies there too.
+    assert!(value["worst_tile"]["x"].as_i64().is_some_and(|x| x >= 12), "{value}");
+    let apart = folder.run(&["compare", "part.exr", "left.exr"]);
+    assert_eq!(code(&apart), 65);
+    assert!(stderr(&apart).contains("no pixel in common"), "{}", stderr(&apart));
 }
 
 /// Waits for a render to be under way, stops it as Ctrl-C (`INT`) or a scheduler (`TERM`) does.
@@ -511,10 +598,9 @@ fn stopped_render(folder: &Folder, signals: &[&str]) -> (i32, String) {
     let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().expect("piped")));
     lines.next().expect("a line").expect("text");
     std::thread::sleep(std::time::Duration::from_millis(500));
-    for signal in signals {
-        let sent = Command::new("kill").args([signal, &child.id().to_string()[..]]).status();
-        assert!(sent.expect("kill runs").success());
-    }
+    // One shell, so that nothing comes between them.
+    let kills: Vec<String> = signals.iter().map(|signal| format!("kill {signal} {}", child.id())).collect();
+    assert!(Command::new("sh").args(["-c", &kills.join("; ")]).status().expect("a shell").success());
     let said: Vec<String> = lines.map_while(Result::ok).collect();
     // No status (it was killed) is no code of ours.
     (child.wait().expect("ends").code().unwrap_or(-1), said.join("\n"))
@@ -532,6 +618,40 @@ fn an_interrupt_writes_the_picture_so_far_and_ends_with_130() {
         let bytes = std::fs::read(folder.0.join("x.exr")).expect("written");
         assert!(bytes.windows(19).any(|w| w == b"irradiant/spp_taken"));
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_an_audit_and_the_picture_is_there() {
+    let folder = Folder::new("audit-interrupt");
+    let mut child = folder
+        .command(&[&["render", "-q", "-o", "x.pfm", "--audit=100000000"], &SMALL[..]].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    // The picture is written before the audit begins.
+    while !folder.0.join("x.pfm").exists() {
+        assert!(child.try_wait().expect("can be asked").is_none(), "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs").success());
+    let output = child.wait_with_output().expect("ends");
+    assert_eq!(code(&output), 130, "{}", stderr(&output));
+    assert!(stderr(&output).contains("of 100000000 particles; the picture has been written"), "{}", stderr(&output));
+    // The books of the particles so far.
+    assert!(stdout(&output).contains("emitted"), "{}", stdout(&output));
+}
+
+/// As GNU timeout does: it signals its child, and at once the group that the child is in.
+#[cfg(unix)]
+#[test]
+fn two_signals_at_once_are_one_wish() {
+    let folder = Folder::new("timeout");
+    let (code, said) = stopped_render(&folder, &["-TERM", "-INT"]);
+    assert_eq!(code, 130, "{said}");
+    assert!(said.contains("stopped early") && folder.names() == ["x.exr"], "{said}");
 }
 
 #[test]
@@ -565,7 +685,9 @@ fn versions_and_help_are_there() {
 fn layers_are_written_beside_the_picture_and_told_of() {
     let folder = Folder::new("layers");
     let aov = ["--aov", "bounces:2", "--aov", "red=L.*D'red'.*E", "--max-depth", "2", "--contact-sheet", "sheet.png"];
-    let output = folder.run(&[&["render", "-o", "box.exr"], &SMALL[..], &aov].concat());
+    // Paths enough to tell what the limit leaves out.
+    let size = ["--resolution", "64x64", "--spp", "16"];
+    let output = folder.run(&[&["render", "-o", "box.exr"], &size[..], &aov].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert_eq!(folder.names(), ["box.exr", "sheet.png"]);
     for told in [
@@ -583,6 +705,9 @@ fn layers_are_written_beside_the_picture_and_told_of() {
     for channel in ["R", "K0.R", "K2.B", "Krest.G", "red.R"] {
         assert!(image.channel_index(channel).is_some(), "{channel}: {:?}", image.channels());
     }
+    // Too few say nothing.
+    let few = folder.run(&["render", "-o", "few.exr", "--resolution", "24x24", "--spp", "1", "--max-depth", "5"]);
+    assert!(code(&few) == 0 && !stderr(&few).contains("leaves out light"), "{}", stderr(&few));
     let sheet = std::fs::read(folder.0.join("sheet.png")).expect("readable");
     assert!(irradiant::image::read(&sheet, "sheet.png", &irradiant::image::ReadOptions::default()).is_ok());
 }
@@ -610,7 +735,7 @@ fn a_black_picture_is_told_of() {
     // With too few paths that found any, nothing is said of how much light a limit leaves out.
     let output = folder.run(&["render", "point.pbrt", "-o", "x.exr", "--max-depth", "1"]);
     let said = stderr(&output);
-    assert!(said.contains("0 found light beyond it") && !said.contains("black"), "{said}");
+    assert!(!said.contains("leaves out") && !said.contains("beyond") && !said.contains("black"), "{said}");
 }
 
 #[test]

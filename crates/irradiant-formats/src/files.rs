@@ -39,6 +39,7 @@ impl Assets for FileAssets {
     fn read(&self, path: &Path) -> Result<Arc<[u8]>, AssetError> {
         let fail = |e: std::io::Error| match e.kind() {
             std::io::ErrorKind::NotFound => AssetError::NotFound,
+            std::io::ErrorKind::PermissionDenied => AssetError::Unreadable("permission denied".into()),
             _ => AssetError::Unreadable(e.to_string()),
         };
         let file = std::fs::File::open(path).map_err(fail)?;

@@ -60,8 +60,18 @@ impl fmt::Display for ImageError {
             Self::TooLarge { needed, allowed } => {
                 write!(f, "image too large: it needs {needed} bytes, {allowed} are allowed")
             }
-            Self::Io { path, error } => write!(f, "{}: {error}", path.display()),
+            Self::Io { path, error } => write!(f, "{}: {}", path.display(), plain_reason(error)),
         }
+    }
+}
+
+/// Why the file system refused, in words that are the same wherever the program runs; what has none here as the system says it.
+pub fn plain_reason(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such file".into(),
+        std::io::ErrorKind::IsADirectory => "it is a folder".into(),
+        std::io::ErrorKind::PermissionDenied => "permission denied".into(),
+        _ => error.to_string(),
     }
 }
 

@@ -39,7 +39,7 @@ pub struct WorstTile {
     pub x: usize,
     /// Upper row of the tile.
     pub y: usize,
-    /// Mean of the picture over the mean of the reference in the tile; infinite or NaN if the latter is 0.
+    /// Mean of the picture over the mean of the reference in the tile; infinite if the latter is 0.
     pub ratio: f64,
     /// |difference of the means| / (reference's mean there + 1 % of its mean everywhere).
     pub deviation: f64,
@@ -62,7 +62,7 @@ pub struct Comparison {
     pub mean_ratio: f64,
     /// The same for each channel.
     pub channel_ratios: Vec<f64>,
-    /// The tile of 16 x 16 pixels that deviates most; `None` for an empty picture.
+    /// The tile of 16 x 16 pixels that deviates most, of those that are not black in both; `None` if all are.
     pub worst_tile: Option<WorstTile>,
     /// Names of the channels that were compared.
     pub channels: Vec<String>,
@@ -119,8 +119,8 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, CompareEr
             }
             let n = samples as f64;
             let deviation = ratio_or_zero((a - b).abs() / n, b.abs() / n + 0.01 * mean.abs());
-            // An empty tile has nothing to say: its NaN fails the comparison.
-            if deviation >= 0.0 && worst.is_none_or(|worst| deviation > worst.deviation) {
+            // Tiles without samples, or without light in both pictures, have no ratio.
+            if (a, b) != (0.0, 0.0) && deviation >= 0.0 && worst.is_none_or(|worst| deviation > worst.deviation) {
                 worst = Some(WorstTile { x: left, y: top, ratio: a / b, deviation });
             }
         }
@@ -174,7 +174,11 @@ mod tests {
         assert_eq!((same.mse, same.mae, same.mape, same.rel_mse, same.mean_ratio), (0.0, 0.0, 0.0, 0.0, 1.0));
         assert_eq!((same.psnr, same.not_finite), (f64::INFINITY, 0));
         let black = Image::new(3, 3, &["Y"]);
-        assert_eq!(compare(&black, &black).unwrap().rel_mse, 0.0);
+        let of_black = compare(&black, &black).unwrap();
+        assert_eq!((of_black.rel_mse, of_black.worst_tile), (0.0, None));
+        // A black corner has no ratio of means, and does not hide that of the others.
+        let corner = Image::from_fn(40, 20, ["Y"], |x, _| [if x < 16 { 0.0 } else { 1.0 }]);
+        assert_eq!(compare(&corner, &corner).unwrap().worst_tile.map(|t| (t.x, t.ratio)), Some((16, 1.0)));
     }
 
     #[test]

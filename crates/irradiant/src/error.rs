@@ -1,6 +1,7 @@
 //! What can go wrong, split by who can fix it.
 
 use irradiant_image::ImageError;
+use irradiant_image::error::plain_reason;
 use irradiant_scene::{Diagnostics, Severity, Sources};
 use std::path::PathBuf;
 
@@ -83,7 +84,7 @@ impl std::fmt::Display for Error {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Scene(report) => write!(f, "{report}"),
-            Self::Unreadable { path, why } => write!(f, "cannot read {}: {why}", path.display()),
+            Self::Unreadable { path, why } => write!(f, "cannot read {}: {}", path.display(), plain_reason(why)),
             Self::Settings(what) => write!(f, "{what}"),
             Self::Output { path, why } => write!(f, "cannot write {}: {why}", path.display()),
             Self::Internal(what) => write!(f, "a bug in Irradiant: {what}"),

@@ -23,13 +23,13 @@ pub struct ProbeArguments {
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel, allow_hyphen_values = true, required_unless_present = "residual")]
     pixel: Option<Pixel>,
     /// Which of the pixel's samples
-    #[arg(long, value_name = "I", default_value_t = 0)]
+    #[arg(long, value_name = "I", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32))]
     sample: u32,
     /// So many samples, from that one on
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     paths: u32,
     /// Only light after so many scattering events: a number, or a range A..B
-    #[arg(long, value_name = "N|A..B", value_parser = parse_bounces)]
+    #[arg(long, value_name = "N|A..B", allow_hyphen_values = true, value_parser = parse_bounces)]
     bounces: Option<RangeInclusive<u32>>,
     /// As one JSON object
     #[arg(long)]
@@ -42,13 +42,13 @@ pub struct ProbeArguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sample", "paths", "bounces", "output", "residual"])]
     incident: Option<PathBuf>,
     /// Side of that picture, pixels
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
     side: u32,
     /// Instead of paths: test the rendering equation at so many random points
-    #[arg(long, value_name = "POINTS", conflicts_with_all = ["pixel", "sample", "paths", "bounces", "output"], value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "POINTS", conflicts_with_all = ["pixel", "sample", "paths", "bounces", "output"], allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     residual: Option<u32>,
     /// Paths for each pixel of the picture of --incident (64), or for each side of each equation of --residual (4096)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     rays: Option<u32>,
     #[command(flatten)]
     pub picture: PictureOptions,

@@ -299,6 +299,8 @@ pub struct FilmTotals {
     pub min_count: u32,
     /// Most samples taken of a pixel, refused ones included.
     pub max_count: u32,
+    /// Pixels of which no sample was taken: nothing is known of them, and they are black.
+    pub pixels_without_samples: u64,
     /// Mean standard error of a pixel over the mean of the picture, estimated as if samples were independent.
     pub relative_error: f64,
 }
@@ -428,6 +430,7 @@ impl Film {
             let taken = pixel.count + pixel.not_finite + pixel.out_of_range;
             totals.min_count = totals.min_count.min(taken);
             totals.max_count = totals.max_count.max(taken);
+            totals.pixels_without_samples += u64::from(taken == 0);
             let light = splats.map_or(SplatEstimate::default(), |(plane, n)| plane.estimate(i, n));
             mean += pixel.mean().iter().sum::<f64>() + light.mean.iter().sum::<f64>();
             let of_mean = pixel.variance().map(|v| v / pixel.count.max(1) as f64);
@@ -501,6 +504,16 @@ mod tests {
         assert_eq!((pixel.count, pixel.not_finite, pixel.out_of_range, pixel.square_overflow), (2, 1, 1, 1));
         assert_eq!(pixel.mean()[2], 3.0);
         assert_eq!(pixel.variance()[2], f64::INFINITY);
+    }
+
+    #[test]
+    fn pixels_without_samples_are_those_that_nothing_was_taken_of() {
+        let mut film = film();
+        assert_eq!(film.totals().pixels_without_samples, 9);
+        film.tile.add(2, 1, [0.0; 3], &[0.0; 2]);
+        // One that was refused is one that was taken.
+        film.tile.add(3, 2, [f32::NAN; 3], &[0.0; 2]);
+        assert_eq!(film.totals().pixels_without_samples, 7);
     }
 
     #[test]

@@ -28,6 +28,7 @@ use irradiant_math::{Frame, Normal3, Point2, Vec3, warp};
 use irradiant_scene::desc::SamplerKind;
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 use std::f32::consts::PI;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What to trace.
 #[derive(Clone, Copy, Debug)]
@@ -135,13 +136,31 @@ struct Chunk {
     events: u64,
 }
 
+/// An audit under way, for who watches it from another thread.
+#[derive(Debug, Default)]
+pub struct AuditWatch {
+    /// Set it, and no more particles are begun but those of the chunks under way.
+    pub stop: AtomicBool,
+    /// Particles traced.
+    pub done: AtomicU64,
+}
+
 /// Traces light from the lamps on all cores and keeps the books; `None` in a scene without light.
 pub fn audit(scene: &Scene, settings: &AuditSettings) -> Option<EnergyAudit> {
+    watched_audit(scene, settings, &AuditWatch::default())
+}
+
+/// As [`audit`], to be watched and stopped: then the books are of the particles so far, which are as good as any, and `None` if there
+/// are none.
+pub fn watched_audit(scene: &Scene, settings: &AuditSettings, watch: &AuditWatch) -> Option<EnergyAudit> {
     let lights = scene.lights.as_slice();
     let picker = PowerSampler::new(lights)?;
     let chunks = settings.paths.div_ceil(CHUNK).max(1);
     let sampler = Sampler::new(SamplerKind::Independent, 1, [1, 1], settings.seed ^ 0x9e37_79b9_7f4a_7c15);
     let all = grid(1, chunks as usize, |_, chunk| {
+        if watch.stop.load(Ordering::Relaxed) {
+            return None;
+        }
         let n = CHUNK.min(settings.paths - (chunk as u64 * CHUNK).min(settings.paths));
         let nothing = Chunk {
             sides: Tally::default(),
@@ -162,9 +181,10 @@ pub fn audit(scene: &Scene, settings: &AuditSettings) -> Option<EnergyAudit> {
         for i in 0..n {
             particle.trace(&sampler, [chunk as i32, 1], i as u32);
         }
-        particle.books
+        watch.done.fetch_add(n, Ordering::Relaxed);
+        Some(particle.books)
     });
-    let mut books = all.values.into_iter();
+    let mut books = all.values.into_iter().flatten();
     let mut total = books.next()?;
     for chunk in books {
         total.sides.merge(&chunk.sides);

@@ -18,7 +18,7 @@ pub mod story;
 pub mod tally;
 pub mod view;
 
-pub use audit::{AuditSettings, EnergyAudit, audit};
+pub use audit::{AuditSettings, AuditWatch, EnergyAudit, audit, watched_audit};
 pub use dimensions::{DimensionAudit, dimensions};
 pub use incident::{Incident, IncidentSettings, Residual, incident, residuals};
 pub use story::{PathStory, replay};

@@ -35,7 +35,7 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
             name: "stop",
             range: OptionRange::Count(1, 16),
             default: Value::Count(4),
-            doc: "scattering events after which the recursion stops, unless --max-depth is less; b^stop rays",
+            doc: "scattering events after which the recursion stops, unless --max-depth is less; b^stop rays, 65536 at most",
         },
     ],
     make: |options, max_depth| {
@@ -48,6 +48,10 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
         })
     },
 };
+
+/// Most rays that may leave the last surfaces of one sample. A time limit or an interrupt waits for the tile under way: 256 samples, so 34
+/// million rays with those before the last.
+const MOST_RAYS: u64 = 65_536;
 
 /// What can be set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +72,20 @@ impl Integrator for DistributionIntegrator {
             let eye = walk.camera_ray.ray;
             self.radiance_in(walk, &eye, 0)
         });
+    }
+
+    fn check(&self, _scene: &Scene) -> Result<(), String> {
+        let too_many = |rays: u32, events: u32| u64::from(rays).checked_pow(events).is_none_or(|n| n > MOST_RAYS);
+        let (rays, events) = (self.rays, self.max_depth);
+        if !too_many(rays, events) {
+            return Ok(());
+        }
+        let fewer_rays = (1..=rays).take_while(|&fewer| !too_many(fewer, events)).last().unwrap_or(1);
+        let fewer_events = MOST_RAYS.ilog(u64::from(rays).max(2));
+        Err(format!(
+            "distribution: {rays} rays from each surface are {rays}^{events} after {events} events, for each sample of each pixel; it takes on \
+             {MOST_RAYS}: try --estimator stop={fewer_events}, or --estimator rays={fewer_rays}"
+        ))
     }
 
     fn limits(&self) -> Vec<Limit> {
