@@ -395,7 +395,13 @@ impl RadianceImage {
         for y in 0..self.height {
             for x in 0..self.width {
                 let rgb = self.pixel(x, y);
-                let largest = if rgb[0] >= rgb[1] && rgb[0] >= rgb[2] { 0 } else if rgb[1] >= rgb[2] { 1 } else { 2 };
+                let largest = if rgb[0] >= rgb[1] && rgb[0] >= rgb[2] {
+                    0
+                } else if rgb[1] >= rgb[2] {
+                    1
+                } else {
+                    2
+                };
                 if !(rgb[largest] > 0.0) {
                     continue;
                 }
