@@ -1,6 +1,7 @@
 //! The open set: what walks a scene, one call per work unit.
 
 use irradiant_core::film::{FilmTile, PixelBounds};
+use irradiant_core::interaction::ShapeId;
 use irradiant_core::light::Light;
 use irradiant_core::scene::Scene;
 use std::ops::{AddAssign, Range};
@@ -127,8 +128,10 @@ pub enum Limit {
 pub enum SceneHas {
     /// Lights that no ray meets: points, spots, distant lights.
     DeltaLights,
-    /// Materials with smooth mirrors or glass, for all that is known without looking textures up.
+    /// Materials of shapes with smooth mirrors or glass, for all that is known without looking textures up.
     DeltaLobes,
+    /// A camera that paths from lights do not reach.
+    UnreachedCamera,
     /// Lights that rays meet: area lights and environments.
     Lamps,
     /// Lights at a place, which something may stand behind: all but environments and distant lights.
@@ -145,7 +148,11 @@ impl SceneHas {
         let lights = scene.lights.as_slice();
         match self {
             Self::DeltaLights => lights.iter().any(Light::is_delta),
-            Self::DeltaLobes => scene.materials.may_be_specular(),
+            Self::DeltaLobes => {
+                let shapes = (0..scene.geometry.n_shapes() as u32).map(ShapeId);
+                scene.materials.may_be_specular(shapes.map(|shape| scene.geometry.material(shape)))
+            }
+            Self::UnreachedCamera => scene.light_path_obstacle().is_some(),
             Self::Lamps => !lights.iter().all(Light::is_delta),
             Self::PlacedLights => lights.iter().any(|l| l.bounds().is_some()),
             Self::CurvedLamps => {
@@ -159,6 +166,15 @@ impl SceneHas {
 }
 
 impl Limit {
+    /// Of estimators that find delta lights by light samples at surfaces the eye's path comes to, and no other way: a surface whose
+    /// light comes by way of delta lobes gets none of it. Takes two events at least.
+    pub fn caustics_of_delta_lights(max_depth: Option<u32>) -> Option<Self> {
+        (max_depth.is_none_or(|limit| limit >= 2)).then_some(Self::Unfound(
+            "what delta lights shine on by way of smooth mirrors or glass",
+            &[SceneHas::DeltaLights, SceneHas::DeltaLobes],
+        ))
+    }
+
     /// Whether a picture of this scene is limited so.
     pub fn concerns(&self, scene: &Scene) -> bool {
         match self {

@@ -98,7 +98,8 @@ impl Integrator for PathIntegrator {
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
         let regularize = self.regularize.then(|| Limit::Bias("regularize".into()));
-        depth.into_iter().chain(regularize).collect()
+        // With `regularize` too: thin glass, glossy paint and indices of 1 stay sharp.
+        depth.into_iter().chain(Limit::caustics_of_delta_lights(self.max_depth)).chain(regularize).collect()
     }
 }
 

@@ -255,7 +255,7 @@ impl Integrator for SelfIntersectionIntegrator {
                 Some(Limit::Bias(format!("self-intersection {word}")))
             }
         };
-        depth.into_iter().chain(leaving).collect()
+        depth.into_iter().chain(Limit::caustics_of_delta_lights(self.max_depth)).chain(leaving).collect()
     }
 }
 

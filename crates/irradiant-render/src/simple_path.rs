@@ -159,7 +159,10 @@ impl Integrator for SimplePathIntegrator {
         // What chance cannot find.
         let lights = (!self.sample_lights).then_some(Limit::Unfound("delta lights", &[SceneHas::DeltaLights]));
         let lobes = (!self.sample_bsdf).then_some(Limit::Unfound("delta lobes", &[SceneHas::DeltaLobes]));
-        depth.into_iter().chain(lights).chain(lobes).collect()
+        // Without lights or lobes they are lost with these.
+        let caustics =
+            Limit::caustics_of_delta_lights(self.max_depth).filter(|_| self.sample_lights && self.sample_bsdf);
+        depth.into_iter().chain(lights).chain(lobes).chain(caustics).collect()
     }
 }
 

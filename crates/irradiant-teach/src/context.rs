@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// How much time a lesson may take on two cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,17 @@ pub(crate) struct Lesson {
     pub(crate) folder: Option<PathBuf>,
     pub(crate) fault: Option<(Fault, Wrong)>,
     kept: Mutex<BTreeMap<String, Kept>>,
+    /// What each row is at; none of those that do not run.
+    running: Vec<Mutex<Option<Running>>>,
+}
+
+/// A row at work.
+struct Running {
+    since: Instant,
+    /// Scenes that it has read.
+    scenes: u32,
+    /// The last of them.
+    scene: String,
 }
 
 impl Lesson {
@@ -46,7 +57,22 @@ impl Lesson {
         fault: Option<(Fault, Wrong)>,
     ) -> Self {
         let outcomes = rows.iter().map(|_| OnceLock::new()).collect();
-        Self { rows, outcomes, budget, seed, folder, fault, kept: Mutex::default() }
+        let running = rows.iter().map(|_| Mutex::default()).collect();
+        Self { rows, outcomes, budget, seed, folder, fault, kept: Mutex::default(), running }
+    }
+
+    /// What rows that have run for `patience` or longer are at, a line for each.
+    pub(crate) fn news(&self, patience: Duration) -> Vec<String> {
+        let news = |(row, running): (&Row, &Mutex<Option<Running>>)| {
+            let running = running.lock().unwrap_or_else(|e| e.into_inner());
+            let at = running.as_ref().filter(|at| at.since.elapsed() >= patience)?;
+            let seconds = at.since.elapsed().as_secs();
+            Some(match at.scenes {
+                0 => format!("{}: {seconds} s so far", row.id),
+                n => format!("{}: {seconds} s so far, scene {n}: {}", row.id, at.scene),
+            })
+        };
+        self.rows.iter().zip(&self.running).filter_map(news).collect()
     }
 
     /// The outcome of a row, measured once.
@@ -54,6 +80,8 @@ impl Lesson {
         self.outcomes[index].get_or_init(|| {
             let row = &self.rows[index];
             let started = Instant::now();
+            let at = |running| *self.running[index].lock().unwrap_or_else(|e| e.into_inner()) = running;
+            at(Some(Running { since: started, scenes: 0, scene: String::new() }));
             let context = Context { lesson: self, id: row.id, index, seeds: AtomicU64::new(0) };
             // A panic is a failure of this row, not of the lesson.
             let ran = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| (row.run)(&context)));
@@ -63,6 +91,11 @@ impl Lesson {
                 Err(_) => Outcome::fails("it panicked"),
             };
             let quick = if self.budget == Budget::Quick { "--quick " } else { "" };
+            at(None);
+            if let Some(missing) = context.command_without_scene(&outcome) {
+                outcome =
+                    Outcome { verdict: Verdict::Fails(format!("no scene for its command: {missing}")), ..outcome };
+            }
             outcome.commands.push(format!("irradiant teach {quick}--row {}", row.id));
             outcome.seconds = started.elapsed().as_secs_f64();
             outcome
@@ -152,6 +185,9 @@ impl Context<'_> {
 
     /// Reads a scene, and leaves it in the lesson's folder under `name` for whoever wants to render it.
     pub fn file(&self, name: &str, text: &str) -> Result<SceneFile, Error> {
+        if let Some(at) = self.lesson.running[self.index].lock().unwrap_or_else(|e| e.into_inner()).as_mut() {
+            (at.scenes, at.scene) = (at.scenes + 1, name.to_string());
+        }
         let folder = self.scenes_folder();
         let path = folder.join(format!("{name}.pbrt"));
         let output = |error| Error::Output {
@@ -173,8 +209,22 @@ impl Context<'_> {
 
     /// The command that renders a scene of this lesson.
     pub fn command(&self, name: &str, rest: &str) -> String {
-        let folder = self.lesson.folder.as_deref().unwrap_or(std::path::Path::new("teach"));
-        format!("irradiant render {}/scenes/{name}.pbrt {rest}", folder.display())
+        format!("irradiant render {}/{name}.pbrt {rest}", self.told_folder().display())
+    }
+
+    /// Where commands say that scenes are.
+    fn told_folder(&self) -> PathBuf {
+        self.lesson.folder.as_deref().unwrap_or(std::path::Path::new("teach")).join("scenes")
+    }
+
+    /// A command that names a scene which was not written.
+    fn command_without_scene<'a>(&self, outcome: &'a Outcome) -> Option<&'a str> {
+        let there = |command: &str| {
+            let told = format!("{}/", self.told_folder().display());
+            let name = command.split_once(&told).and_then(|(_, rest)| rest.split_once(".pbrt"));
+            name.is_some_and(|(name, _)| self.scenes_folder().join(format!("{name}.pbrt")).is_file())
+        };
+        outcome.commands.iter().map(String::as_str).find(|command| command.contains(".pbrt") && !there(command))
     }
 
     fn settings(&self, setup: Setup) -> RenderSettings {

@@ -53,6 +53,8 @@ pub struct Measure {
     pub detectable: String,
     /// Within the bound, and the bound was sharp enough.
     pub passes: bool,
+    /// A goal for this machine's speed: where it is not met, nothing is wrong with the physics.
+    pub of_speed: bool,
 }
 
 /// A picture of a row: PNG bytes.
@@ -88,6 +90,12 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Whether goals of speed are all that was not met.
+    pub fn is_only_slow(&self) -> bool {
+        let mut out = self.measures.iter().filter(|m| !m.passes).peekable();
+        matches!(self.verdict, Verdict::Fails(_)) && out.peek().is_some() && out.all(|m| m.of_speed)
+    }
+
     /// Not measured, because something is missing.
     pub fn waits(why: impl Into<String>) -> Self {
         Self::ended(Verdict::Waits(why.into()))

@@ -5,7 +5,7 @@
 
 use crate::estimate::Estimate;
 use crate::row::{Measure, Outcome, Picture, Verdict};
-use irradiant::image::{FileFormat, Image, ToneCurve, ToneOptions, to_srgb8, write};
+use irradiant::image::{FileFormat, Image, Pixels, ToneCurve, ToneOptions, to_srgb8, write};
 use irradiant_testkit::{Mean, Tiles};
 
 /// Standard errors that a right program exceeds with chance 1e-6.
@@ -37,6 +37,25 @@ fn percent(x: f64) -> String {
     format!("{} %", number(100.0 * x))
 }
 
+/// Pixels across that a picture is enlarged to, at least, if that takes no more than [`MOST`] times.
+const WIDE: usize = 400;
+const MOST: usize = 6;
+
+/// A small coded picture with each pixel repeated, so that it can be seen where it is shown as it is.
+fn enlarged(coded: Image) -> Image {
+    let (w, h, channels) = (coded.width(), coded.height(), coded.channel_count());
+    let times = WIDE.div_ceil(w.max(1)).min(MOST);
+    let Pixels::U8(samples) = coded.pixels() else { return coded };
+    let mut large = Vec::with_capacity(samples.len() * times * times);
+    for row in samples.chunks(w * channels) {
+        let wide: Vec<u8> =
+            row.chunks(channels).flat_map(|pixel| std::iter::repeat_n(pixel, times).flatten().copied()).collect();
+        (0..times).for_each(|_| large.extend_from_slice(&wide));
+    }
+    let names: Vec<&str> = coded.channels().iter().map(String::as_str).collect();
+    Image::from_u8(w * times, h * times, &names, large, coded.encoding()).unwrap_or(coded)
+}
+
 impl Sheet {
     /// Nothing yet.
     pub fn new() -> Self {
@@ -44,7 +63,7 @@ impl Sheet {
     }
 
     fn push(&mut self, what: &str, value: String, bound: String, detectable: String, passes: bool) {
-        self.measures.push(Measure { what: what.into(), value, bound, detectable, passes });
+        self.measures.push(Measure { what: what.into(), value, bound, detectable, passes, of_speed: false });
     }
 
     /// Two independent pictures estimate the same thing: every channel's mean, and every tile, within noise, where a bias of
@@ -129,6 +148,12 @@ impl Sheet {
         self.push(what, number(value), format!("at most {}", number(bound)), "anything above".into(), value <= bound);
     }
 
+    /// A goal of speed: at most so many seconds on this machine. What is slower is no error, and the row says so.
+    pub fn seconds_at_most(&mut self, what: &str, seconds: f64, goal: f64) {
+        self.push(what, number(seconds), format!("at most {}", number(goal)), "anything above".into(), seconds <= goal);
+        self.measures.iter_mut().last().into_iter().for_each(|m| m.of_speed = true);
+    }
+
     /// A number is at least `bound`.
     pub fn at_least(&mut self, what: &str, value: f64, bound: f64) {
         self.push(what, number(value), format!("at least {}", number(bound)), "anything below".into(), value >= bound);
@@ -175,15 +200,14 @@ impl Sheet {
     /// A picture from linear pixels, brightened by `exposure` stops.
     pub fn picture(&mut self, name: &str, caption: &str, image: &Image, exposure: f32) {
         let options = ToneOptions { exposure, curve: ToneCurve::None, dither: true };
-        let encoded = to_srgb8(image, &options).and_then(|coded| write(&coded, FileFormat::Png));
+        let encoded = to_srgb8(image, &options).and_then(|coded| {
+            let large = enlarged(coded);
+            Ok((large.width(), large.height(), write(&large, FileFormat::Png)?))
+        });
         match encoded {
-            Ok(png) => self.pictures.push(Picture {
-                name: name.into(),
-                caption: caption.into(),
-                width: image.width(),
-                height: image.height(),
-                png,
-            }),
+            Ok((width, height, png)) => {
+                self.pictures.push(Picture { name: name.into(), caption: caption.into(), width, height, png });
+            }
             Err(why) => {
                 self.holds(&format!("picture {name}"), format!("{why}"), "can be written", "any failure", false);
             }
@@ -216,7 +240,14 @@ impl Sheet {
     /// All measured: the row passes when each measure does. A row that measured nothing fails.
     pub fn finish(self) -> Outcome {
         let failed = self.measures.iter().filter(|m| !m.passes);
-        let failed: Vec<String> = failed.map(|m| format!("{}: {}; bound: {}", m.what, m.value, m.bound)).collect();
+        let failed = failed.map(|m| match m.of_speed {
+            true => format!(
+                "not met: {} s on this machine, the goal is {} (speed, not correctness): {}",
+                m.value, m.bound, m.what
+            ),
+            false => format!("{}: {}; bound: {}", m.what, m.value, m.bound),
+        });
+        let failed: Vec<String> = failed.collect();
         let verdict = if self.measures.is_empty() {
             Verdict::Fails("nothing was measured".into())
         } else if failed.is_empty() {
@@ -232,5 +263,41 @@ impl Sheet {
             commands: self.commands,
             seconds: 0.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_only_slow_says_so_and_what_is_wrong_too_does_not() {
+        let mut slow = Sheet::new();
+        slow.at_most("error", 0.5, 1.0);
+        slow.seconds_at_most("seconds for it", 7.25, 6.0);
+        let mut wrong = Sheet::new();
+        wrong.at_most("error", 2.0, 1.0);
+        wrong.seconds_at_most("seconds for it", 7.25, 6.0);
+        let mut met = Sheet::new();
+        met.seconds_at_most("seconds for it", 5.0, 6.0);
+        let (slow, wrong, met) = (slow.finish(), wrong.finish(), met.finish());
+        assert!(slow.is_only_slow() && !wrong.is_only_slow() && !met.is_only_slow());
+        let Verdict::Fails(why) = slow.verdict else { panic!("a goal that is not met does not pass") };
+        assert!(why.starts_with("not met: 7.250 s on this machine") && why.contains("speed, not correctness"), "{why}");
+        assert_eq!(met.verdict, Verdict::Passes);
+    }
+
+    #[test]
+    fn small_pictures_are_enlarged_pixel_by_pixel_and_large_ones_kept() {
+        let mut sheet = Sheet::new();
+        for (name, width) in [("tiny", 3), ("strip", 150), ("large", 640)] {
+            let image = Image::from_fn(width, 2, ["R", "G", "B"], |x, y| [x as f32 / width as f32, y as f32, 0.5]);
+            sheet.picture(name, "", &image, 0.0);
+        }
+        let sizes: Vec<_> = sheet.pictures.iter().map(|p| (p.width, p.height)).collect();
+        assert_eq!(sizes, [(18, 12), (450, 6), (640, 2)]);
+        let coded = Image::from_u8(2, 1, &["Y"], vec![7, 200], irradiant::image::Encoding::Srgb).expect("an image");
+        let Pixels::U8(samples) = enlarged(coded).into_pixels() else { panic!("codes") };
+        assert_eq!(samples, [[7; 6], [200; 6]].concat().repeat(6));
     }
 }

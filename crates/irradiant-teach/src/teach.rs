@@ -7,7 +7,8 @@ use crate::walk::Wrong;
 use irradiant::Error;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -67,6 +68,7 @@ impl Lesson {
         for told in &self.told {
             match &told.outcome.verdict {
                 Verdict::Passes => {}
+                Verdict::Fails(why) if told.outcome.is_only_slow() => text += &format!("\n  {}: {why}", told.row.id),
                 Verdict::Fails(why) => text += &format!("\n  {} fails: {why}", told.row.id),
                 Verdict::Waits(why) => text += &format!("\n  {} waits: {why}", told.row.id),
             }
@@ -82,6 +84,9 @@ impl Lesson {
 
 /// Rows that measure time; they run when nothing else does.
 const ALONE: [&str; 1] = ["A70"];
+
+/// A row that runs longer than this says on stderr what it is at, again and again.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Runs rows; `listen` hears of each in the lectures' order, as soon as it and all before it are done.
 pub fn teach(settings: &Settings, listen: impl Fn(&Told) + Sync) -> Result<Lesson, Error> {
@@ -126,18 +131,28 @@ pub fn teach(settings: &Settings, listen: impl Fn(&Told) + Sync) -> Result<Lesso
         }
     };
     std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some(&i) = first.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    shared.outcome(i);
-                    tell();
-                }
-            });
+        let (done, waiting) = channel::<()>();
+        let shared = &shared;
+        scope.spawn(move || {
+            while waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+                shared.news(PATIENCE).iter().for_each(|line| eprintln!("{line}"));
+            }
+        });
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    while let Some(&i) = first.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        shared.outcome(i);
+                        tell();
+                    }
+                });
+            }
+        });
+        for &i in &last {
+            shared.outcome(i);
         }
+        drop(done);
     });
-    for &i in &last {
-        shared.outcome(i);
-    }
     tell();
     let told = order.iter().map(|&i| Told { row: shared.rows[i], outcome: shared.outcome(i).clone() }).collect();
     Ok(Lesson {

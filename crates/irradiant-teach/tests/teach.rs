@@ -83,6 +83,35 @@ fn the_same_rows_pass_without_faults() {
     assert!(QUICK.iter().all(|id| faults().iter().any(|f| f.row == *id)));
 }
 
+/// Rows whose commands are of all kinds. That every command of every row names a scene that was written, the rows themselves check.
+const COMMANDED: [&str; 7] = ["A09", "A19", "A27", "B18", "B28", "B38", "B47"];
+
+#[test]
+fn commands_name_scenes_that_parse_and_samples_that_they_have() {
+    let folder = Folder::new("commands");
+    let lesson = teach(&settings(&folder, &COMMANDED, None), |_| {}).expect("runs");
+    let mut kinds = BTreeSet::new();
+    for command in lesson.told.iter().flat_map(|t| &t.outcome.commands) {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        let Some(path) = words.iter().find(|w| w.ends_with(".pbrt")) else { continue };
+        kinds.insert(words[1]);
+        let file = irradiant::load(Path::new(path)).unwrap_or_else(|e| panic!("{command}: {e}"));
+        let scene = irradiant::Job::new(&file, &irradiant::RenderSettings::default())
+            .unwrap_or_else(|e| panic!("{command}: {e}"))
+            .scene;
+        let after = |option: &str| words.iter().position(|w| *w == option).map(|i| words[i + 1]);
+        if let Some(sample) = after("--sample") {
+            assert!(sample.parse::<u32>().expect("a number") < scene.samples_per_pixel, "{command}");
+        }
+        if let Some((x, y)) = after("--pixel").and_then(|pixel| pixel.split_once(',')) {
+            let bounds = scene.bounds();
+            let (x, y): (i32, i32) = (x.parse().expect("a number"), y.parse().expect("a number"));
+            assert!((bounds.x0..bounds.x1).contains(&x) && (bounds.y0..bounds.y1).contains(&y), "{command}");
+        }
+    }
+    assert_eq!(kinds, BTreeSet::from(["check", "probe", "render"]));
+}
+
 #[test]
 fn unknown_rows_and_faults_are_refused() {
     let folder = Folder::new("unknown");

@@ -486,6 +486,78 @@ fn hostile_scenes_give_finite_pictures() {
     assert_agree(&both, &path, 0.2, "hair");
 }
 
+/// Light of a point by way of a smooth ball: who finds it says nothing, who does not says so, and only where a scene has both. Names
+/// and depths as data; the pictures are of one sample, the labels exact.
+#[test]
+fn labels_tell_of_the_caustics_of_delta_lights_where_they_are_lost() {
+    const POINT: &str = "LightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 0 0.8 0 ]\n";
+    const LOST: &str = "what delta lights shine on by way of smooth mirrors or glass";
+    const TWICE: &str = "what mirrors and glass show of the light that delta lights send by way of mirrors and glass";
+    const SEEN: &str = "what the camera sees directly of the light that delta lights send by way of mirrors and glass";
+    let label = |scene: &str, name: &str, options: &[&str], depth: Option<u32>| {
+        let file = load_text("test", scene, ".").unwrap_or_else(|e| panic!("{e}"));
+        let how = How::new(1, 1).by(by(name, options));
+        let how = match depth {
+            Some(depth) => how.depth(depth),
+            None => how,
+        };
+        render(&file, &how.settings()).unwrap_or_else(|e| panic!("{name}: {e}")).header.estimate
+    };
+    let both = in_box(2, &(POINT.to_string() + GLASS));
+    for name in ["path", "sharedpath", "simplepath", "iterative", "partitioned", "perlength"] {
+        let options: &[&str] = match name {
+            "iterative" | "partitioned" | "perlength" => &["emission=power"],
+            _ => &[],
+        };
+        assert!(label(&both, name, options, None).contains(LOST), "{name}: {}", label(&both, name, options, None));
+        assert_eq!(label(&both, name, options, Some(3)), format!("truncated: maxdepth 3, {LOST}"), "{name}");
+        // Such light takes two events: without the second, the depth limit says it all.
+        assert_eq!(label(&both, name, options, Some(1)), "truncated: maxdepth 1", "{name}");
+    }
+    assert_eq!(label(&both, "path", &[], None), format!("truncated: {LOST}"));
+    assert!(label(&both, "path", &["regularize=true"], None).starts_with(&format!("truncated: {LOST}; biased: ")));
+    assert_eq!(label(&both, "simplepath", &["samplelights=false"], None), "truncated: delta lights");
+    assert_eq!(label(&both, BDPT, &[], None), format!("truncated: {TWICE}"));
+    assert_eq!(label(&both, BDPT, &[], Some(2)), "truncated: maxdepth 2");
+    let all_around = both.replace("\"perspective\" \"float fov\" 70", "\"spherical\"");
+    assert_eq!(label(&all_around, BDPT, &[], None), format!("truncated: {TWICE}, {SEEN}"));
+    assert!(label(&both, "photon", &[], None).starts_with("biased: photon radius "));
+
+    // One of the two is not enough, nor is a material that no shape has.
+    let rough = GLASS.replace("\"dielectric\"", "\"dielectric\" \"float roughness\" 0.3");
+    assert!(rough.contains("roughness"));
+    let unused = POINT.to_string() + "MakeNamedMaterial \"ice\" \"string type\" \"dielectric\"\n";
+    for content in [LAMP.to_string() + GLASS, POINT.to_string() + &rough, unused.clone()] {
+        for name in ["path", "sharedpath", BDPT] {
+            assert_eq!(label(&in_box(2, &content), name, &[], None), "unbiased", "{name}: {content}");
+        }
+    }
+    // What a mix holds counts, and every kind of light that is a point or a direction.
+    let mixed = unused
+        + "MakeNamedMaterial \"snow\" \"string type\" \"diffuse\"\nMaterial \"mix\" \"string materials\" [ \"snow\" \"ice\" ]\nShape \"sphere\" \"float radius\" 0.3\n";
+    assert_eq!(label(&in_box(2, &mixed), "path", &[], None), format!("truncated: {LOST}"));
+    for kind in ["spot", "distant"] {
+        let scene = both.replace("LightSource \"point\" \"rgb I\" [ 9 9 9 ]", &format!("LightSource \"{kind}\""));
+        assert_eq!(label(&scene, "path", &[], None), format!("truncated: {LOST}"), "{kind}");
+    }
+}
+
+/// What the label says, measured: on the floor under a glass ball and a point light, `path` and `bdpt` at depth 1 (no light through the ball)
+/// agree, and at depth 3 `bdpt` finds on the whole what `path` does not. A caustic of 5 % of the light would be seen.
+#[test]
+fn path_does_not_find_a_points_light_through_glass_and_bidirectional_does() {
+    const POINT: &str = "LightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 0.3 0.7 0.2 ]\n";
+    let scene = in_box(8, &(POINT.to_string() + GLASS));
+    let grey = |name: &str, depth: u32, seed: u64| {
+        let picture = estimate(&scene, How::new(256, seed).depth(depth).by(by(name, &[])));
+        picture.mean.iter().flatten().sum::<f64>() / (3 * picture.mean.len()) as f64
+    };
+    let (path, both) = (grey("path", 1, 1), grey(BDPT, 1, 2));
+    assert!((both / path - 1.0).abs() < 0.02, "direct light: {path} {both}");
+    let (path, both) = (grey("path", 3, 3), grey(BDPT, 3, 4));
+    assert!(both > 1.05 * path, "with caustics: {path} {both}");
+}
+
 #[test]
 fn pictures_say_what_they_lack_and_scenes_that_cannot_be_traced_are_refused() {
     let label = |scene: &str, name: &str| {

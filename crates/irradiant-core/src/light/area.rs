@@ -13,7 +13,7 @@
 //! Departure: where alpha lies between 0 and 1, pbrt-v4 tests it twice on hits (alpha^2 of the light) and once on
 //! samples; here it counts once everywhere.
 
-use super::emission::RadianceImage;
+use super::emission::{MeanRadiance, RadianceImage};
 use super::{AlphaAt, Emission, EmittedRay, LightBounds, LightHit, LightSample, LightTarget};
 use crate::geometry::EmitterShape;
 use crate::interaction::ReferencePoint;
@@ -40,15 +40,15 @@ pub struct AreaImage {
     pub image: RadianceImage,
     /// Factor on it.
     pub scale: f32,
-    /// Its mean colour.
-    pub mean_rgb: [f32; 3],
+    /// Its mean.
+    mean: MeanRadiance,
 }
 
 impl AreaRadiance {
     /// `scale` times an image.
     pub fn image(image: RadianceImage, scale: f32) -> Self {
-        let mean_rgb = image.mean_rgb(|_| 1.0);
-        Self::Image(Arc::new(AreaImage { image, scale, mean_rgb }))
+        let mean = image.mean_radiance(|_| 1.0);
+        Self::Image(Arc::new(AreaImage { image, scale, mean }))
     }
 }
 
@@ -158,7 +158,7 @@ impl AreaLight {
     pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
         let radiance = match &self.radiance {
             AreaRadiance::Uniform(emission) => emission.sample(lambda),
-            AreaRadiance::Image(a) => a.image.radiance(a.mean_rgb, lambda) * a.scale,
+            AreaRadiance::Image(a) => a.mean.sample(&a.image, lambda) * a.scale,
         };
         radiance * (PI * self.sides() * self.shape.area() * self.scale)
     }
@@ -169,7 +169,7 @@ impl AreaLight {
             // Curves are never drawn from, so they should not be picked.
             _ if matches!(self.shape, EmitterShape::Curve(_)) => 0.0,
             AreaRadiance::Uniform(emission) => emission.max_value(),
-            AreaRadiance::Image(a) => a.mean_rgb.iter().sum::<f32>() / 3.0 * a.scale,
+            AreaRadiance::Image(a) => a.mean.rgb.iter().sum::<f32>() / 3.0 * a.scale,
         };
         let cone = self.shape.normal_cone();
         LightBounds {

@@ -365,6 +365,59 @@ impl RadianceImage {
     }
 }
 
+/// Cells along each of two ratios.
+const RATIO_CELLS: usize = 32;
+
+/// The mean of an image's radiance, each pixel with a weight.
+///
+/// Uplifting is not linear: the spectrum of the mean colour is not the mean of the colours' spectra (of a sky with a sunset in it
+/// by 16 % of the watts). But it keeps factors, so colours are gathered by their ratios to their largest component, in cells so
+/// small that it is as good as linear within each.
+#[derive(Clone, Debug)]
+pub(crate) struct MeanRadiance {
+    /// The share of each cell that is not black, in the image's space.
+    cells: Box<[[f32; 3]]>,
+    /// All together.
+    pub rgb: [f32; 3],
+}
+
+impl MeanRadiance {
+    /// As a spectrum; `image` is the one that it is the mean of.
+    pub fn sample(&self, image: &RadianceImage, lambda: &Wavelengths) -> SampledSpectrum {
+        self.cells.iter().fold(SampledSpectrum::ZERO, |sum, &rgb| sum + image.radiance(rgb, lambda))
+    }
+}
+
+impl RadianceImage {
+    /// The mean over pixels of radiance times `weight(u, v)` at their centres.
+    pub(crate) fn mean_radiance(&self, weight: impl Fn(Point2) -> f32) -> MeanRadiance {
+        let mut sums = vec![[0f64; 3]; 3 * RATIO_CELLS * RATIO_CELLS];
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let rgb = self.pixel(x, y);
+                let largest = if rgb[0] >= rgb[1] && rgb[0] >= rgb[2] {
+                    0
+                } else if rgb[1] >= rgb[2] {
+                    1
+                } else {
+                    2
+                };
+                if !(rgb[largest] > 0.0) {
+                    continue;
+                }
+                let cell = |c: usize| ((rgb[c] / rgb[largest] * RATIO_CELLS as f32) as usize).min(RATIO_CELLS - 1);
+                let i = (largest * RATIO_CELLS + cell((largest + 1) % 3)) * RATIO_CELLS + cell((largest + 2) % 3);
+                let w = f64::from(weight(self.center_of(x, y)));
+                (0..3).for_each(|c| sums[i][c] += f64::from(rgb[c]) * w);
+            }
+        }
+        let n = (self.width * self.height) as f64;
+        let rgb = std::array::from_fn(|c| (sums.iter().map(|sum| sum[c]).sum::<f64>() / n) as f32);
+        let cells = sums.iter().map(|sum| sum.map(|s| (s / n) as f32)).filter(|&cell| cell != [0.0; 3]).collect();
+        MeanRadiance { cells, rgb }
+    }
+}
+
 /// The space of an image's chromaticities; sRGB when it states none, or ones that no space has.
 pub(crate) fn color_space_of(image: &Image) -> &'static ColorSpace {
     image

@@ -12,7 +12,7 @@
 //! samples BSDFs and weighs both (MIS), the density is *compensated*: pixels below the mean are left to the BSDF
 //! (Karlik et al. 2019, "MIS compensation", as in pbrt-v4), and a uniform environment is left to it altogether.
 
-use super::emission::RadianceImage;
+use super::emission::{MeanRadiance, RadianceImage};
 use super::environment_density::{PixelDensity, PixelLine, PixelRun, PixelSample};
 use super::orientation::Orientation;
 use super::{Emission, EmittedRay, LightSample, LightTarget, SampleMode, SceneSphere};
@@ -82,7 +82,7 @@ pub struct ImageInfiniteLight {
     orientation: Orientation,
     scale: f32,
     scene: SceneSphere,
-    mean_rgb: [f32; 3],
+    mean: MeanRadiance,
     /// Each is made when first asked for; a render needs but one of them.
     complete: OnceLock<PixelDensity>,
     compensated: OnceLock<PixelDensity>,
@@ -91,13 +91,13 @@ pub struct ImageInfiniteLight {
 impl ImageInfiniteLight {
     /// From a square image; `None` when it is not square.
     pub fn new(image: RadianceImage, orientation: Orientation, scale: f32, scene: SceneSphere) -> Option<Self> {
-        let mean_rgb = image.mean_rgb(|_| 1.0);
+        let mean = image.mean_radiance(|_| 1.0);
         (image.width() == image.height()).then(|| Self {
             image,
             orientation,
             scale,
             scene,
-            mean_rgb,
+            mean,
             complete: OnceLock::new(),
             compensated: OnceLock::new(),
         })
@@ -204,9 +204,9 @@ impl ImageInfiniteLight {
         (self.radiance(rgb, lambda), self.pdf_of(rgb, direction, mode))
     }
 
-    /// See [`super::Light::power`]; of the mean colour, which is the mean power but for the bend of uplifting.
+    /// See [`super::Light::power`].
     pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
-        self.image.radiance(self.mean_rgb, lambda) * (self.scale * 4.0 * PI * self.scene.disk_area())
+        self.mean.sample(&self.image, lambda) * (self.scale * 4.0 * PI * self.scene.disk_area())
     }
 
     /// See [`super::Light::emit`].

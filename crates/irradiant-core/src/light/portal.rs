@@ -6,7 +6,7 @@
 //! box (Bitterli, Novak and Jarosz 2015, "Portal-masked environment map sampling"; details as in pbrt-v4: the resampled
 //! image has the resolution of the original and constant pixels).
 
-use super::emission::RadianceImage;
+use super::emission::{MeanRadiance, RadianceImage};
 use super::orientation::Orientation;
 use super::{EmittedRay, LightSample, LightTarget};
 use irradiant_math::distribution::WindowedPiecewiseConstant2D;
@@ -25,7 +25,7 @@ pub struct PortalInfiniteLight {
     image: RadianceImage,
     scale: f32,
     distribution: WindowedPiecewiseConstant2D,
-    mean_rgb: [f32; 3],
+    mean: MeanRadiance,
 }
 
 /// Why four corners are not a portal.
@@ -71,8 +71,8 @@ impl PortalInfiniteLight {
         let solid_angle = |uv| direction(&frame, uv).1;
         let distribution = WindowedPiecewiseConstant2D::new(image.sampling_weights(solid_angle), width, height)
             .ok_or(PortalError::NotSquare)?;
-        let mean_rgb = image.mean_rgb(solid_angle);
-        Ok(Self { corners, frame, image, scale, distribution, mean_rgb })
+        let mean = image.mean_radiance(solid_angle);
+        Ok(Self { corners, frame, image, scale, distribution, mean })
     }
 
     /// The part of the image that the portal shows from `p`; `None` from behind it.
@@ -131,7 +131,7 @@ impl PortalInfiniteLight {
 
     /// See [`super::Light::power`]: radiance integrated over directions, times the portal's area.
     pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
-        self.image.radiance(self.mean_rgb, lambda) * (self.scale * self.area())
+        self.mean.sample(&self.image, lambda) * (self.scale * self.area())
     }
 
     /// See [`super::Light::emit`]: from points of the portal, so that what stands outside of it does not matter.

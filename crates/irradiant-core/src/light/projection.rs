@@ -10,7 +10,7 @@
 //! The projector looks along the light's +z with the slide's top at +y; pixels are looked up without interpolation.
 //! Intensity is the pixel's colour times the illuminant of the image's colour space, at every angle to the axis.
 
-use super::emission::RadianceImage;
+use super::emission::{MeanRadiance, RadianceImage};
 use super::orientation::Orientation;
 use super::point::sample_from_point;
 use super::{EmittedRay, LightBounds, LightSample};
@@ -31,8 +31,8 @@ pub struct ProjectionLight {
     image: RadianceImage,
     scale: f32,
     screen: Screen,
-    /// Mean RGB, each pixel weighted by its solid angle: what power is proportional to.
-    mean_rgb: [f32; 3],
+    /// Mean, each pixel weighted by its solid angle: what power is proportional to.
+    mean: MeanRadiance,
     mean_max: f32,
     distribution: PiecewiseConstant2D,
 }
@@ -83,11 +83,11 @@ impl ProjectionLight {
     pub fn new(p: Point3, orientation: Orientation, image: RadianceImage, scale: f32, fov: f32) -> Option<Self> {
         let screen = Screen::new(image.width(), image.height(), fov);
         let weights = image.sampling_weights(|uv| screen.solid_angle_by_area(uv));
-        let mean_rgb = image.mean_rgb(|uv| screen.solid_angle_by_area(uv));
+        let mean = image.mean_radiance(|uv| screen.solid_angle_by_area(uv));
         let sum: f64 = image.pixels().map(|c| f64::from(c[0].max(c[1]).max(c[2]))).sum();
         let mean_max = (sum / image.pixels().len() as f64) as f32;
         let distribution = PiecewiseConstant2D::new(weights, image.width(), image.height())?;
-        Some(Self { p, orientation, image, scale, screen, mean_rgb, mean_max, distribution })
+        Some(Self { p, orientation, image, scale, screen, mean, mean_max, distribution })
     }
 
     /// See [`super::Light::sample`].
@@ -99,9 +99,9 @@ impl ProjectionLight {
         })
     }
 
-    /// See [`super::Light::power`]; of the mean colour, which is the mean power but for the bend of uplifting.
+    /// See [`super::Light::power`].
     pub fn power(&self, lambda: &Wavelengths) -> SampledSpectrum {
-        self.image.radiance(self.mean_rgb, lambda) * (self.scale * self.screen.area())
+        self.mean.sample(&self.image, lambda) * (self.scale * self.screen.area())
     }
 
     /// See [`super::Light::bounds`].

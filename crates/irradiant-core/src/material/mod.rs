@@ -390,9 +390,27 @@ impl Materials {
         self.force_diffuse
     }
 
-    /// Whether any material may scatter into single directions (a delta), for all that is known without looking textures up.
-    pub fn may_be_specular(&self) -> bool {
-        !self.force_diffuse && self.entries.iter().any(|entry| entry.material.may_be_specular())
+    /// Whether any of these materials, or what they mix, may scatter into single directions (a delta), for all that is known without
+    /// looking textures up.
+    pub fn may_be_specular(&self, ids: impl Iterator<Item = MaterialId>) -> bool {
+        if self.force_diffuse {
+            return false;
+        }
+        let (mut seen, mut open) = (vec![false; self.entries.len()], vec![]);
+        for id in ids {
+            open.push(id.0 as usize);
+            while let Some(i) = open.pop() {
+                if i >= seen.len() || std::mem::replace(&mut seen[i], true) {
+                    continue;
+                }
+                match &self.entries[i].material {
+                    Material::Mix { materials, .. } => open.extend(materials.map(|part| part.0 as usize)),
+                    other if other.may_be_specular() => return true,
+                    _ => {}
+                }
+            }
+        }
+        false
     }
 
     /// Whether a material looks anything up in textures, so that it needs to know how large a pixel is where it is met.

@@ -19,7 +19,7 @@ mod weights;
 pub use weights::Heuristic;
 
 use crate::camera_samples::for_each_sample;
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};
 use crate::light_trace::Splats;
 use crate::registry::{IntegratorEntry, OptionEntry, OptionRange, Value};
 use irradiant_core::film::FilmTile;
@@ -152,7 +152,17 @@ impl Integrator for BidirectionalIntegrator {
     fn limits(&self) -> Vec<Limit> {
         let depth = self.max_depth.map(Limit::MaxDepth);
         let part = self.shown.map(|_| Limit::OtherQuantity("one strategy of the bidirectional estimator"));
-        depth.into_iter().chain(part).collect()
+        // A join takes two surfaces in a row that are not deltas there, or one that the lens sees.
+        let within = |events| self.max_depth.is_none_or(|limit| limit >= events);
+        let twice = within(3).then_some(Limit::Unfound(
+            "what mirrors and glass show of the light that delta lights send by way of mirrors and glass",
+            &[SceneHas::DeltaLights, SceneHas::DeltaLobes],
+        ));
+        let directly = within(2).then_some(Limit::Unfound(
+            "what the camera sees directly of the light that delta lights send by way of mirrors and glass",
+            &[SceneHas::DeltaLights, SceneHas::DeltaLobes, SceneHas::UnreachedCamera],
+        ));
+        depth.into_iter().chain(twice).chain(directly).chain(part).collect()
     }
 }
 

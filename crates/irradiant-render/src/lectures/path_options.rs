@@ -59,6 +59,7 @@ impl PathOptions {
             .chain(self.roulette.limit(self.max_depth))
             .chain(self.emission.limit())
             .chain(self.lights.limit())
+            .chain(Limit::caustics_of_delta_lights(self.max_depth))
             .collect()
     }
 

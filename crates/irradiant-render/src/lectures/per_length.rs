@@ -67,7 +67,11 @@ impl Integrator for PerLengthIntegrator {
     }
 
     fn limits(&self) -> Vec<Limit> {
-        depth_limit(self.max_depth).chain(self.emission.limit()).chain(self.lights.limit()).collect()
+        depth_limit(self.max_depth)
+            .chain(self.emission.limit())
+            .chain(self.lights.limit())
+            .chain(Limit::caustics_of_delta_lights(self.max_depth))
+            .collect()
     }
 }
 

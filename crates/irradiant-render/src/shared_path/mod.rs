@@ -171,7 +171,7 @@ impl Integrator for SharedPathIntegrator {
     }
 
     fn limits(&self) -> Vec<Limit> {
-        self.max_depth.map(Limit::MaxDepth).into_iter().collect()
+        self.max_depth.map(Limit::MaxDepth).into_iter().chain(Limit::caustics_of_delta_lights(self.max_depth)).collect()
     }
 }
 

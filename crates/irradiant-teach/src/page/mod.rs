@@ -45,9 +45,10 @@ const CHAPTERS: &[(&str, &str)] = &[
     ("B39", "The good and the bad"),
 ];
 
-fn word(verdict: &Verdict) -> (&'static str, &'static str) {
-    match verdict {
+fn word(outcome: &Outcome) -> (&'static str, &'static str) {
+    match outcome.verdict {
         Verdict::Passes => ("passes", "\u{2713} passes"),
+        Verdict::Fails(_) if outcome.is_only_slow() => ("slow", "\u{2026} too slow, not wrong"),
         Verdict::Fails(_) => ("fails", "\u{2717} fails"),
         Verdict::Waits(_) => ("waits", "\u{2026} waits"),
     }
@@ -72,7 +73,8 @@ fn measures(outcome: &Outcome) -> String {
     let n = outcome.measures.len();
     let failed = outcome.measures.iter().filter(|m| !m.passes).count();
     let label = match (n, failed) {
-        (1, 0) => "1 measure".to_string(),
+        (1, 0) => "1 measure, within its bound".to_string(),
+        (1, _) => "1 measure, out of bounds".to_string(),
         (n, 0) => format!("{n} measures, all within their bounds"),
         (n, f) => format!("{n} measures, {f} out of bounds"),
     };
@@ -96,7 +98,7 @@ fn measures(outcome: &Outcome) -> String {
 
 fn row(told: &Told, here: &Here) -> String {
     let (row, outcome) = (&told.row, &told.outcome);
-    let (class, label) = word(&outcome.verdict);
+    let (class, label) = word(outcome);
     let mut html = format!(
         "<article class=\"row {class}\" id=\"{0}\"><header><a class=\"id\" href=\"#{0}\">{0}</a><h3>{1}</h3><span class=\"verdict\">{label}</span></header>\n",
         row.id,
@@ -168,12 +170,22 @@ fn lecture(lesson: &Lesson, letter: char, title: &str, intro: &str) -> String {
     html + "</section>\n"
 }
 
+/// A number with its noun, or verb.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// Rows whose goal of speed this machine does not meet, if there are any.
+fn slow_too(slow: usize) -> String {
+    if slow == 0 { String::new() } else { format!(", {} too slow, not wrong", counted(slow, "is", "are")) }
+}
+
 /// The page. Pictures of `hero` rows stand at its top.
 pub fn page(lesson: &Lesson) -> String {
     let (n, passed) = (lesson.told.len(), lesson.passed());
     let here: Here = lesson.told.iter().map(|t| t.row.id).collect();
-    let count = |class: &str| lesson.told.iter().filter(|t| word(&t.outcome.verdict).0 == class).count();
-    let (fails, waits) = (count("fails"), count("waits"));
+    let count = |class: &str| lesson.told.iter().filter(|t| word(&t.outcome).0 == class).count();
+    let (fails, slow, waits) = (count("fails"), count("slow"), count("waits"));
     let measures: usize = lesson.told.iter().map(|t| t.outcome.measures.len()).sum();
     let mut html = String::with_capacity(1 << 22);
     let _ = writeln!(
@@ -187,8 +199,11 @@ pub fn page(lesson: &Lesson) -> String {
     };
     let _ = writeln!(
         html,
-        "<div class=\"top\"><h1>Two lectures, executable</h1>\n<p class=\"lead\">What two lectures on global illumination say, claim by claim, and what Irradiant {} measures of it. A row passes only through a measurement that could have failed.</p>\n<p class=\"score\"><strong>{passed}</strong> of {n} rows pass</p>\n<div class=\"bar\" role=\"img\" aria-label=\"{passed} pass, {fails} fail, {waits} wait\"><i class=\"passes\" style=\"flex:{passed}\"></i><i class=\"fails\" style=\"flex:{fails}\"></i><i class=\"waits\" style=\"flex:{waits}\"></i></div>\n<p class=\"facts\">{measures} measures, {fails} rows fail, {waits} wait \u{b7} {budget} budget, seed {}, {:.0} s</p>",
+        "<div class=\"top\"><h1>Two lectures, executable</h1>\n<p class=\"lead\">What two lectures on global illumination say, claim by claim, and what Irradiant {} measures of it. A row passes only through a measurement that could have failed.</p>\n<p class=\"score\"><strong>{passed}</strong> of {n} rows pass</p>\n<div class=\"bar\" role=\"img\" aria-label=\"{passed} pass, {fails} fail, {slow} too slow, {waits} wait\"><i class=\"passes\" style=\"flex:{passed}\"></i><i class=\"fails\" style=\"flex:{fails}\"></i><i class=\"slow\" style=\"flex:{slow}\"></i><i class=\"waits\" style=\"flex:{waits}\"></i></div>\n<p class=\"facts\">{}, {}, {} \u{b7} {budget} budget, seed {}, {:.0} s</p>",
         irradiant::VERSION,
+        counted(measures, "measure", "measures"),
+        counted(fails, "row fails", "rows fail") + &slow_too(slow),
+        counted(waits, "waits", "wait"),
         lesson.seed,
         lesson.seconds
     );
@@ -209,6 +224,7 @@ pub fn page(lesson: &Lesson) -> String {
     for (id, label, n) in [
         ("all", "all", n),
         ("fails", "fails", fails),
+        ("slow", "too slow, not wrong", slow),
         ("waits", "waits", waits),
         ("pictures", "with pictures", lesson.told.iter().filter(|t| !t.outcome.pictures.is_empty()).count()),
     ] {
@@ -221,7 +237,7 @@ pub fn page(lesson: &Lesson) -> String {
         let _ = write!(
             html,
             "<a class=\"{}\" href=\"#{1}\" title=\"{2}\">{1}</a>",
-            word(&t.outcome.verdict).0,
+            word(&t.outcome).0,
             t.row.id,
             escaped(t.row.name)
         );
@@ -265,6 +281,13 @@ mod tests {
             assert_eq!(base64(text.as_bytes()), coded);
         }
         assert_eq!(base64(&[0xff, 0xfe, 0xfd]), "//79");
+    }
+
+    #[test]
+    fn numbers_agree_with_their_words() {
+        assert_eq!(counted(1, "row fails", "rows fail"), "1 row fails");
+        assert_eq!(counted(0, "row fails", "rows fail") + &slow_too(0), "0 rows fail");
+        assert_eq!(counted(2, "row fails", "rows fail") + &slow_too(1), "2 rows fail, 1 is too slow, not wrong");
     }
 
     #[test]

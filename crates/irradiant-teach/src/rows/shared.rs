@@ -74,14 +74,19 @@ pub fn kind_of_light(part: &Part) -> usize {
     }
 }
 
-/// Pictures of one size side by side.
+/// Pictures of one size side by side, in reading order: up to four in a row, rows of about as many.
 pub fn strip(images: &[&Image]) -> Image {
     let Some(first) = images.first() else { return Image::new(1, 1, &["R", "G", "B"]) };
     let (w, h) = (first.width(), first.height());
     let gap = 2;
-    Image::from_fn(images.len() * (w + gap) - gap, h, ["R", "G", "B"], |x, y| {
-        let (i, x) = (x / (w + gap), x % (w + gap));
-        if x < w { std::array::from_fn(|c| images[i].get(x, y, c)) } else { [1.0; 3] }
+    let rows = images.len().div_ceil(4);
+    let columns = images.len().div_ceil(rows);
+    Image::from_fn(columns * (w + gap) - gap, rows * (h + gap) - gap, ["R", "G", "B"], |x, y| {
+        let (column, x, row, y) = (x / (w + gap), x % (w + gap), y / (h + gap), y % (h + gap));
+        match images.get(row * columns + column) {
+            Some(image) if x < w && y < h => std::array::from_fn(|c| image.get(x, y, c)),
+            _ => [1.0; 3],
+        }
     })
 }
 

@@ -44,7 +44,7 @@ pub const ROWS: &[Row] = &[
         id: "B42",
         name: "And the bad: 10, 100, 1000 paths a pixel",
         says: "Caustics are noisy even at 1000.",
-        check: "A metal ring and a glass ball under a small lamp at 10, 100 and 1000 paths, with plain path tracing and with a caustic-aware mode.",
+        check: "A metal ring and a glass ball under a small lamp at 10, 100 and 1000 paths (quick: 128), with plain path tracing and with a caustic-aware mode.",
         run: hard_paths::the_bad,
     },
     Row {
@@ -354,6 +354,7 @@ fn pbrt_scenes(c: &Context) -> Result<Outcome, Error> {
         );
     }
     sheet.none_of("scenes or words of the format that are refused or replaced", count, &wrong);
-    sheet.command("irradiant check scenes/everything.pbrt");
+    c.file("everything", scenes::EVERYTHING)?;
+    sheet.command(c.command("everything", "").replace("irradiant render", "irradiant check").trim_end());
     Ok(sheet.finish())
 }

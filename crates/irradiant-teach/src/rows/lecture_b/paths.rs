@@ -247,8 +247,8 @@ fn probabilities(c: &Context) -> Result<Outcome, Error> {
     sheet.at_most("contributions told, against the sample", sums, 1e-5);
     sheet.at_most("multiple-importance weights, against the power heuristic of the densities told", weights, 1e-5);
     sheet.command(format!(
-        "irradiant probe {} --pixel 3,4 --sample 5",
-        c.command("lit-box", "").trim_start_matches("irradiant render ").trim()
+        "irradiant probe {} --pixel 3,4 --sample 2",
+        c.command("lit-box", "").trim_start_matches("irradiant render ").trim_end()
     ));
     Ok(sheet.finish())
 }
