@@ -542,20 +542,24 @@ fn labels_tell_of_the_caustics_of_delta_lights_where_they_are_lost() {
     }
 }
 
-/// What the label says, measured: on the floor under a glass ball and a point light, `path` and `bdpt` at depth 1 (no light through the ball)
-/// agree, and at depth 3 `bdpt` finds on the whole what `path` does not. A caustic of 5 % of the light would be seen.
+/// What the label says, measured: a glass ball hangs between a point light and the floor. Direct light (one event) is the same to `path`
+/// and `bdpt`, within 2 %; with light through the ball (three events) `bdpt` has more, in its shadow by half at least.
 #[test]
 fn path_does_not_find_a_points_light_through_glass_and_bidirectional_does() {
-    const POINT: &str = "LightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 0.3 0.7 0.2 ]\n";
-    let scene = in_box(8, &(POINT.to_string() + GLASS));
-    let grey = |name: &str, depth: u32, seed: u64| {
+    const POINT: &str = "LightSource \"point\" \"rgb I\" [ 9 9 9 ] \"point3 from\" [ 0.2 0.85 0.3 ]\n";
+    let ball =
+        GLASS.replace("Translate 0.3 -0.5 0.2", "Translate 0.2 0.3 0.3").replace("radius\" 0.4", "radius\" 0.25");
+    let scene = in_box(8, &(POINT.to_string() + &ball));
+    let pixels = |name: &str, depth: u32, seed: u64| -> Vec<f64> {
         let picture = estimate(&scene, How::new(256, seed).depth(depth).by(by(name, &[])));
-        picture.mean.iter().flatten().sum::<f64>() / (3 * picture.mean.len()) as f64
+        picture.mean.iter().map(|p| p.iter().sum::<f64>() / 3.0).collect()
     };
-    let (path, both) = (grey("path", 1, 1), grey(BDPT, 1, 2));
-    assert!((both / path - 1.0).abs() < 0.02, "direct light: {path} {both}");
-    let (path, both) = (grey("path", 3, 3), grey(BDPT, 3, 4));
-    assert!(both > 1.05 * path, "with caustics: {path} {both}");
+    let sum = |pixels: &[f64]| pixels.iter().sum::<f64>();
+    let (path, both) = (pixels("path", 1, 1), pixels(BDPT, 1, 2));
+    assert!((sum(&both) / sum(&path) - 1.0).abs() < 0.02, "direct light: {path:?} {both:?}");
+    let (path, both) = (pixels("path", 3, 3), pixels(BDPT, 3, 4));
+    let most = both.iter().zip(&path).map(|(b, p)| b / p).fold(0.0, f64::max);
+    assert!(most > 1.5 && sum(&both) > 1.01 * sum(&path), "{most} {} {}", sum(&both), sum(&path));
 }
 
 #[test]
