@@ -261,13 +261,13 @@ pub fn photons(c: &Context) -> Result<Outcome, Error> {
     // A kept radius is a kept bias. In a group are two independent renders by photons and two by paths, of light of two bounces or
     // more, which alone is blurred; the mean product of the pairs' differences has no noise in its expectation, only the square of the
     // bias. Groups say how well it is known.
-    let direct = Setup { size: Some(task.size), spp: Some(c.spp(4)), ..Setup::default() };
+    let direct = Setup { size: Some(task.size), spp: Some(c.spp(8)), ..Setup::default() };
     let mut grey = Mean::new();
     let mut squares = [Mean::new(); 2];
-    for _ in 0..6 {
+    for _ in 0..8 {
         let (mut references, mut found) = (vec![], [vec![], vec![]]);
         for _ in 0..2 {
-            let spp = c.spp(96);
+            let spp = c.spp(192);
             let scene = c.scene(task.scene, task.text, Setup { spp: Some(spp), ..direct })?;
             let indirect = |p: &crate::estimate::Part| (p.bounces > 1).then_some(0);
             let paths = crate::estimate::Production::limited(3);
@@ -276,7 +276,7 @@ pub fn photons(c: &Context) -> Result<Outcome, Error> {
             let by = |radius: &str, paths: &str, depth: u32| -> Result<Option<Estimate>, Error> {
                 let options = [("radius", radius), ("alpha", "1"), ("paths", paths)];
                 let integrator = c.integrator("photon", &options, Some(depth))?;
-                Ok(integrator.map(|integrator| by_integrator(&scene, &*integrator, c.spp(4)).0))
+                Ok(integrator.map(|integrator| by_integrator(&scene, &*integrator, c.spp(8)).0))
             };
             // The same samples take the same direct light.
             let Some(first) = by("0.1", "1", 1)? else { return Ok(Outcome::waits(MISSING)) };
