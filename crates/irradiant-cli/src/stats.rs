@@ -129,7 +129,7 @@ pub fn audit_in_words(scene: &Scene, books: &EnergyAudit) -> String {
             "refused", books.refused, books.paths
         );
         for m in books.by_material.iter().filter(|m| m.refused > 0) {
-            text += &format!(", {} of them first at {}", m.refused, scene.material_name(m.material));
+            text += &format!(", {} of them first at {}", m.refused, name_of(m.material));
         }
         text += REFUSED;
     }

@@ -23,6 +23,9 @@ use irradiant_core::scene::Scene;
 use irradiant_math::Point2;
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
+/// Strata of a choice at most.
+pub(crate) const MOST_SPLITS: u32 = 64;
+
 /// A sample of the light that arrives straight from lamps, unless something is in the way.
 pub(crate) struct ArrivingLight {
     pub light: LightId,
@@ -65,7 +68,8 @@ fn sample_light(
     Some(ArrivingLight { light, radiance, pdf: pmf * sample.pdf, sample })
 }
 
-/// How often a light that is picked with the chance `pmf` is sampled on average, of `splits` strata.
+/// How often a light that is picked with the chance `pmf` is sampled at a vertex, as a weight: the average number where a sampler picks a
+/// light in strata side by side, a little more where it does not (`power`).
 #[inline]
 pub(crate) fn samples_of(pmf: f32, splits: u32) -> f32 {
     (pmf * splits as f32).min(1.0)
@@ -115,29 +119,53 @@ fn split_light<R: PathRecorder>(
     recorder: &mut R,
 ) -> SampledSpectrum {
     let mut sum = SampledSpectrum::ZERO;
-    let pick = |stratum| scene.light_sampler.sample(&at.reference(), draws.pick_in_stratum(stratum, splits));
-    let mut next = pick(0);
-    let mut stratum = 0;
-    while stratum < splits {
-        let picked = next;
-        // Those of one light lie side by side.
-        let mut times = 0;
-        while stratum < splits && next == picked {
-            times += 1;
-            stratum += 1;
-            if stratum < splits {
-                next = pick(stratum);
-            }
-        }
-        if let Some(picked) = picked
-            && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
-        {
+    for &(picked, times) in PickedLights::of(scene, at, draws, splits).as_slice() {
+        if let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared) {
             let share = times as f32 / splits as f32;
             let samples = samples_of(picked.pmf, splits);
             sum += scattered(scene, at, bsdf, throughput, arriving, samples, share, depth, stats, recorder);
         }
     }
     sum
+}
+
+/// The lights that are sampled at a vertex, each once, with the number of strata that picked it.
+pub(crate) struct PickedLights {
+    lights: [(PickedLight, u32); MOST_SPLITS as usize],
+    count: usize,
+}
+
+impl PickedLights {
+    /// Of `splits` strata.
+    pub fn of(scene: &Scene, at: &Interaction, draws: &LightDraws, splits: u32) -> Self {
+        let none = (PickedLight { id: LightId(0), pmf: 0.0 }, 0);
+        let mut picked = Self { lights: [none; MOST_SPLITS as usize], count: 0 };
+        let reference = at.reference();
+        let splits = if scene.lights.as_slice().len() == 1 { 1 } else { splits };
+        for stratum in 0..splits {
+            let pick = if splits == 1 { draws.pick } else { draws.pick_in_stratum(stratum, splits) };
+            if let Some(light) = scene.light_sampler.sample(&reference, pick) {
+                picked.add(light);
+            }
+        }
+        picked
+    }
+
+    fn add(&mut self, light: PickedLight) {
+        // Most samplers pick a light in strata side by side.
+        let known = self.lights[..self.count].iter_mut().rev().find(|(known, _)| known.id == light.id);
+        if let Some((_, times)) = known {
+            *times += 1;
+        } else if let Some(free) = self.lights.get_mut(self.count) {
+            *free = (light, 1);
+            self.count += 1;
+        }
+    }
+
+    /// In the order in which they were picked.
+    pub fn as_slice(&self) -> &[(PickedLight, u32)] {
+        &self.lights[..self.count]
+    }
 }
 
 /// What one light sample brings along the path; it counts for the `share` of all samples at the vertex. Its light has `samples` there

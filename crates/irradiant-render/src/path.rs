@@ -1,13 +1,13 @@
 //! Path tracing with multiple importance sampling: the production estimator.
 //!
-//! L = sum over i of K^i(Le), one path at a time: at each vertex one light sample and one BSDF sample, combined by the
+//! L = sum over i of K^i(Le), one path at a time: at each vertex a light sample (at the first one several, if asked for) and one BSDF sample, combined by the
 //! power heuristic (Veach and Guibas 1995), ended by Russian roulette on the throughput. Wavelengths: the four of a path
 //! share one set of decisions whose densities do not depend on wavelength, so that no wavelength weighting is needed;
 //! a dispersive vertex ends the secondary ones.
 
 use crate::camera_samples::{CameraSample, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use crate::light_samples::{direct_light, samples_of};
+use crate::light_samples::{MOST_SPLITS, direct_light, samples_of};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
 use irradiant_core::bsdf::Bsdf;
@@ -107,7 +107,7 @@ impl Integrator for PathIntegrator {
 pub(crate) const fn lights_option(default: u32) -> OptionEntry {
     OptionEntry {
         name: "lights",
-        range: OptionRange::Count(1, 64),
+        range: OptionRange::Count(1, MOST_SPLITS),
         default: Value::Count(default),
         doc: "light samples at the first surface, at most one of each light (A59)",
     }
@@ -342,7 +342,7 @@ impl PathIntegrator {
                 bsdf.regularize();
             }
 
-            // Direct light: one sample of one light.
+            // Direct light: a sample of one light, or of several.
             if bsdf.flags().is_non_specular() {
                 let (draws, run) = match light {
                     Some((draws, run)) if depth == 0 => (draws, Some(run)),

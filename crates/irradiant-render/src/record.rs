@@ -33,7 +33,8 @@ pub struct Contribution {
     pub radiance: SampledSpectrum,
     /// Multiple-importance weight that is included.
     pub mis_weight: f32,
-    /// Density of the light sample (chance of the light included), per steradian; 0 where light sampling cannot find it.
+    /// Density of the light sample (chance of the light included; of all samples together where the choice of a light is split), per
+    /// steradian; 0 where light sampling cannot find it.
     pub light_pdf: f32,
     /// Density of the BSDF sample, per steradian; 0 where scattering cannot find it.
     pub bsdf_pdf: f32,

@@ -93,8 +93,9 @@ impl Lesson {
             let quick = if self.budget == Budget::Quick { "--quick " } else { "" };
             at(None);
             if let Some(missing) = context.command_without_scene(&outcome) {
-                outcome =
-                    Outcome { verdict: Verdict::Fails(format!("no scene for its command: {missing}")), ..outcome };
+                // No measures: it must not be taken for a row that is only slow.
+                let verdict = Verdict::Fails(format!("no scene for its command: {missing}"));
+                outcome = Outcome { verdict, measures: vec![], ..outcome };
             }
             outcome.commands.push(format!("irradiant teach {quick}--row {}", row.id));
             outcome.seconds = started.elapsed().as_secs_f64();

@@ -9,7 +9,7 @@ use irradiant::renderer::inspect::{
 };
 use irradiant::renderer::path::PathIntegrator;
 use irradiant::renderer::record::PathEnd;
-use irradiant::{Job, RenderSettings, load_text};
+use irradiant::{IntegratorChoice, Job, RenderSettings, load_text};
 
 /// A room with a lamp, a mirror, glass, rough metal, a coat and a sky that comes in at one side.
 const ROOM: &str = r#"
@@ -47,8 +47,12 @@ AttributeEnd
 "#;
 
 fn job(text: &str) -> (Job, PathIntegrator) {
+    job_with(text, &RenderSettings::default())
+}
+
+fn job_with(text: &str, settings: &RenderSettings) -> (Job, PathIntegrator) {
     let file = load_text("room", text, ".").unwrap_or_else(|e| panic!("{e}"));
-    let job = Job::new(&file, &RenderSettings::default()).unwrap_or_else(|e| panic!("{e}"));
+    let job = Job::new(&file, settings).unwrap_or_else(|e| panic!("{e}"));
     let integrator = job.path_integrator().expect("the path integrator");
     (job, integrator)
 }
@@ -83,6 +87,28 @@ fn the_product_of_densities_is_the_density_in_the_weight() {
         roulette += usize::from(story.end == PathEnd::Roulette);
     }
     assert!(found > 1500 && roulette > 100 && deep > 150 && evaluated > 1000, "{found} {roulette} {deep} {evaluated}");
+}
+
+/// The same where the first surface samples several lights, of one or of several strata each.
+#[test]
+fn the_books_hold_where_the_choice_of_a_light_is_split() {
+    for words in ["lights=3", "lights=8", "lightsampler=power"] {
+        let choice = IntegratorChoice::named("path").and_then(|c| c.with_words("lights=5")?.with_words(words));
+        let integrator = Some(choice.expect("options of path"));
+        let (job, integrator) = job_with(ROOM, &RenderSettings { integrator, ..RenderSettings::default() });
+        let (mut found, mut several) = (0, 0);
+        for story in all_stories(&job, &integrator, 2) {
+            let sum = story.found.iter().map(|f| f.contribution.radiance[0]).sum::<f32>();
+            assert!((sum - story.radiance[0]).abs() <= 1e-5 * sum, "{:?} {sum} {}", story.pixel, story.radiance[0]);
+            for f in &story.found {
+                assert!(f.account.expect("no interfaces here").difference() < 1e-4, "{words} {:?} {f:?}", story.pixel);
+                found += 1;
+            }
+            several += usize::from(story.vertices.first().is_some_and(|v| v.lights.len() > 1));
+        }
+        // By power the sky is picked nearly always.
+        assert!(found > 800 && several > if words.contains("power") { 5 } else { 200 }, "{words}: {found} {several}");
+    }
 }
 
 /// The books have bite: without the chance of survival they do not balance.

@@ -4,7 +4,7 @@
 //! are measured by the scatter of [`REPLICATES`] pictures. Means may be 6.5 joint standard errors apart: with 126 degrees of freedom a right
 //! program exceeds that with odds of 2e-9, or 1e-5 over all pixels here. Single pixels matter: what is wrong among companions, as a forgotten shadow
 //! ray, cancels in a block's mean. Seen to fail: without the shadow rays, without the densities of light samples at metals, without the
-//! scaling of a path that lost wavelengths; and, by 2 to 20 % of like pixels, when those pixels took no part whose own paths failed.
+//! scaling of a path that lost wavelengths; and, by 1 to 20 % of like pixels, when those pixels took no part whose own paths failed.
 
 mod estimate;
 

@@ -37,7 +37,7 @@ fn story(job: &Job, s: &PathStory, bounces: Option<&RangeInclusive<u32>>) -> Val
         LightEnd::Direction(w) => json!({ "direction": vector(world.vector(w)) }),
     };
     let vertex = |v: &Vertex| {
-        let light = v.light.map(|l| {
+        let lights = v.lights.iter().map(|l| {
             let outcome = match l.outcome {
                 LightOutcome::Lit => "lit",
                 LightOutcome::Blocked => "blocked",
@@ -45,6 +45,7 @@ fn story(job: &Job, s: &PathStory, bounces: Option<&RangeInclusive<u32>>) -> Val
             };
             json!({ "light": l.light.0, "to": end(l.to), "outcome": outcome })
         });
+        let lights: Vec<Value> = lights.collect();
         let step = v.step.map(|step| {
             let s = &step.scattering;
             json!({
@@ -67,7 +68,7 @@ fn story(job: &Job, s: &PathStory, bounces: Option<&RangeInclusive<u32>>) -> Val
             "shape": v.at.shape.0,
             "face": v.at.face,
             "emits": v.at.light.is_some(),
-            "light_sample": light,
+            "light_samples": lights,
             "scattering": step,
         })
     };

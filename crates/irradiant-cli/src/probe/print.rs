@@ -60,7 +60,7 @@ fn one(job: &Job, story: &PathStory, bounces: Option<&RangeInclusive<u32>>) {
             if at.light.is_some() { ", emits" } else { "" }
         );
         light_from(i as u32).filter(met).for_each(light);
-        if let Some(tried) = v.light {
+        for tried in &v.lights {
             match tried.outcome {
                 LightOutcome::Lit => {}
                 LightOutcome::Blocked => println!("light        sample of light {}: blocked", tried.light.0),

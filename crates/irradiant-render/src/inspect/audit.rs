@@ -288,7 +288,7 @@ impl Particle<'_> {
             scene.alpha().alpha(alpha.texture, &at).clamp(0.0, 1.0)
         });
         let density = emitted.pdf_position * emitted.pdf_direction * picked.pmf;
-        if !(density > 0.0) {
+        if density <= 0.0 {
             return;
         }
         let mut power = emitted.radiance * (cos * there / density);
@@ -433,7 +433,7 @@ fn albedo(bsdf: &Bsdf, wo: Vec3, n: Normal3, [a, b]: [[f32; 4]; 2]) -> SampledSp
         let share = |w: Vec3| {
             let (cos, density) = (bsdf.abs_cos(w), density(w));
             // A direction in the surface, which the cosine's density draws at the rim of its disk, brings nothing (not 0/0).
-            if !(cos > 0.0 && density > 0.0) {
+            if cos <= 0.0 || density <= 0.0 {
                 return SampledSpectrum::ZERO;
             }
             bsdf.f(wo, w, TransportMode::Importance) * (cos * shading_correction(bsdf, wo, n, w) / density)

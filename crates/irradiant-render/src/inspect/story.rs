@@ -7,6 +7,7 @@
 
 use crate::camera_samples::camera_sample;
 use crate::integrator::RenderStats;
+use crate::light_samples::PickedLights;
 use crate::path::PathIntegrator;
 use crate::record::{Contribution, PathEnd, PathRecorder, Scattering, Technique};
 use irradiant_core::bsdf::Bsdf;
@@ -63,12 +64,12 @@ pub struct Step {
 }
 
 /// A surface that the path met.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Vertex {
     /// Where, and what of.
     pub at: Interaction,
-    /// The light that it asked; `None` where it asked none.
-    pub light: Option<LightTry>,
+    /// The lights that it asked.
+    pub lights: Vec<LightTry>,
     /// How the path went on; `None` at its end.
     pub step: Option<Step>,
 }
@@ -172,7 +173,7 @@ pub fn replay(scene: &Scene, integrator: &PathIntegrator, pixel: [i32; 2], sampl
         camera_ray: camera_ray.ray,
         lambda: drawn.lambda,
         secondary_ended: lambda.secondary_terminated() && !drawn.lambda.secondary_terminated(),
-        vertices: recorder.vertices.iter().map(|&at| Vertex { at, light: None, step: None }).collect(),
+        vertices: recorder.vertices.iter().map(|&at| Vertex { at, lights: vec![], step: None }).collect(),
         escape: recorder.escape,
         found: Vec::new(),
         end: recorder.end.unwrap_or(PathEnd::Absorbed),
@@ -254,8 +255,15 @@ impl Bookkeeper<'_> {
             let scattering = recorder.scatterings.get(depth as usize);
             let asks = bsdf.flags().is_non_specular() && integrator.max_depth.is_none_or(|limit| depth < limit);
             if asks {
-                let c = found(Technique::LightSample, depth + 1).next();
-                story.vertices[depth as usize].light = self.light(&at, &bsdf, &lambda, depth, c, story);
+                let splits = integrator.light_splits_at(depth);
+                let picked = PickedLights::of(scene, &at, &self.stream.light(depth), splits);
+                let strata: u32 = if scene.lights.as_slice().len() == 1 { 1 } else { splits };
+                for &(light, times) in picked.as_slice() {
+                    let c = found(Technique::LightSample, depth + 1).find(|c| c.light == light.id);
+                    let pmf = f64::from(light.pmf) * f64::from(strata) / f64::from(times);
+                    let tried = self.light(&at, &bsdf, &lambda, depth, light.id, pmf, c, story);
+                    story.vertices[depth as usize].lights.extend(tried);
+                }
             }
             if let Some(s) = scattering {
                 any_non_specular |= !s.lobe.is_specular();
@@ -286,20 +294,21 @@ impl Bookkeeper<'_> {
         Account { value, density, density_in_weight }
     }
 
-    /// Asks the vertex's light again.
+    /// Asks a light of the vertex again, which stands for 1/`pmf` lights.
     fn light(
         &self,
         at: &Interaction,
         bsdf: &Bsdf,
         lambda: &Wavelengths,
         depth: u32,
+        id: LightId,
+        pmf: f64,
         found: Option<&Contribution>,
         story: &mut PathStory,
     ) -> Option<LightTry> {
         let scene = self.scene;
         let draws = self.stream.light(depth);
-        let picked = scene.light_sampler.sample(&at.reference(), draws.pick)?;
-        let light = scene.lights.get(picked.id);
+        let light = scene.lights.get(id);
         let sample = light.sample(&at.reference(), draws.uv, lambda, SampleMode::Compensated)?;
         let f = bsdf.f(at.wo, sample.wi, TransportMode::Radiance) * bsdf.abs_cos(sample.wi);
         let arriving = sample.radiance * scene.opacity(&sample);
@@ -310,7 +319,7 @@ impl Bookkeeper<'_> {
         let outcome = match found {
             Some(c) => {
                 let f_cos = std::array::from_fn(|i| f64::from(f[i]));
-                let pdf = f64::from(picked.pmf) * f64::from(sample.pdf);
+                let pdf = pmf * f64::from(sample.pdf);
                 let account = Some(self.account(c, arriving, f_cos, pdf));
                 story.found.push(Found { contribution: *c, from: depth + 1, to, account });
                 LightOutcome::Lit
@@ -318,7 +327,7 @@ impl Bookkeeper<'_> {
             None if f.is_black() || arriving.is_black() => LightOutcome::Black,
             None => LightOutcome::Blocked,
         };
-        Some(LightTry { light: picked.id, to, outcome })
+        Some(LightTry { light: id, to, outcome })
     }
 
     /// Draws the direction again and goes on.

@@ -180,7 +180,7 @@ pub fn challenging(c: &Context) -> Result<Outcome, Error> {
         }
     }
     let Some((gain, time, name)) = best else { return Ok(Outcome::waits(MISSING)) };
-    // The path tracer has several times the samples, so that the clock decides nothing.
+    // The path tracer has eight times the samples and about four times the time: a noisy clock does not decide.
     sheet.at_least(&format!("CPU seconds, path tracer over {name}"), time, 1.5);
     sheet.at_least(
         &format!("bounded error (a pixel's squared relative error, at most 1), path tracer over {name}"),

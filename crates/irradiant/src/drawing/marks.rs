@@ -92,8 +92,10 @@ pub(super) fn marks(job: &Job, stories: &[PathStory], options: &DrawingOptions) 
         };
         // Connections first, so that paths cover them.
         for (i, vertex) in story.vertices.iter().enumerate() {
-            let blocked = vertex.light.filter(|l| l.outcome == LightOutcome::Blocked);
-            if let (Some(l), None, true) = (blocked, &options.bounces, stories.len() <= BLOCKED_UP_TO) {
+            if options.bounces.is_some() || stories.len() > BLOCKED_UP_TO {
+                break;
+            }
+            for l in vertex.lights.iter().filter(|l| l.outcome == LightOutcome::Blocked) {
                 let (a, b) = (points[i + 1], end(points[i + 1], l.to, 0.3));
                 let ink = Ink::Blocked;
                 lines.push(Mark { a, b, ink, opacity, is_vertex: false, from_eye: false, label: String::new() });
