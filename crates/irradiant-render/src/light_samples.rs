@@ -26,6 +26,14 @@ use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 /// Strata of a choice at most.
 pub(crate) const MOST_SPLITS: u32 = 64;
 
+/// That so many strata can be had; options cannot say others, programs can.
+pub(crate) fn check_splits(splits: u32) -> Result<(), String> {
+    match splits {
+        1..=MOST_SPLITS => Ok(()),
+        _ => Err(format!("light_splits is {splits}; take 1 to {MOST_SPLITS}")),
+    }
+}
+
 /// A sample of the light that arrives straight from lamps, unless something is in the way.
 pub(crate) struct ArrivingLight {
     pub light: LightId,
@@ -91,7 +99,7 @@ pub(crate) fn direct_light<R: PathRecorder>(
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
-    if splits > 1 && scene.lights.as_slice().len() > 1 {
+    if strata(scene, splits) > 1 {
         return split_light(scene, at, bsdf, throughput, lambda, draws, prepared, splits, depth, stats, recorder);
     }
     if let Some(picked) = scene.light_sampler.sample(&at.reference(), draws.pick)
@@ -119,9 +127,8 @@ fn split_light<R: PathRecorder>(
     recorder: &mut R,
 ) -> SampledSpectrum {
     let mut sum = SampledSpectrum::ZERO;
-    for &(picked, times) in PickedLights::of(scene, at, draws, splits).as_slice() {
+    for (picked, share) in PickedLights::of(scene, at, draws, splits).iter() {
         if let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared) {
-            let share = times as f32 / splits as f32;
             let samples = samples_of(picked.pmf, splits);
             sum += scattered(scene, at, bsdf, throughput, arriving, samples, share, depth, stats, recorder);
         }
@@ -129,21 +136,29 @@ fn split_light<R: PathRecorder>(
     sum
 }
 
-/// The lights that are sampled at a vertex, each once, with the number of strata that picked it.
+/// Strata into which a choice of light is split: one light needs no choice.
+#[inline]
+fn strata(scene: &Scene, splits: u32) -> u32 {
+    if splits > 1 && scene.lights.as_slice().len() == 1 { 1 } else { splits }
+}
+
+/// The lights that are sampled at a vertex, each once.
 pub(crate) struct PickedLights {
+    strata: u32,
+    /// With the number of strata that picked it.
     lights: [(PickedLight, u32); MOST_SPLITS as usize],
     count: usize,
 }
 
 impl PickedLights {
-    /// Of `splits` strata.
+    /// Of `splits` strata, [`MOST_SPLITS`] at most.
     pub fn of(scene: &Scene, at: &Interaction, draws: &LightDraws, splits: u32) -> Self {
         let none = (PickedLight { id: LightId(0), pmf: 0.0 }, 0);
-        let mut picked = Self { lights: [none; MOST_SPLITS as usize], count: 0 };
+        let strata = strata(scene, splits);
+        let mut picked = Self { strata, lights: [none; MOST_SPLITS as usize], count: 0 };
         let reference = at.reference();
-        let splits = if scene.lights.as_slice().len() == 1 { 1 } else { splits };
-        for stratum in 0..splits {
-            let pick = if splits == 1 { draws.pick } else { draws.pick_in_stratum(stratum, splits) };
+        for stratum in 0..strata {
+            let pick = draws.pick_in_stratum(stratum, strata);
             if let Some(light) = scene.light_sampler.sample(&reference, pick) {
                 picked.add(light);
             }
@@ -162,9 +177,9 @@ impl PickedLights {
         }
     }
 
-    /// In the order in which they were picked.
-    pub fn as_slice(&self) -> &[(PickedLight, u32)] {
-        &self.lights[..self.count]
+    /// In the order in which they were picked, with the share of the strata that picked them.
+    pub fn iter(&self) -> impl Iterator<Item = (PickedLight, f32)> {
+        self.lights[..self.count].iter().map(|&(light, times)| (light, times as f32 / self.strata as f32))
     }
 }
 
@@ -208,4 +223,15 @@ fn scattered<R: PathRecorder>(
         bsdf_pdf: if sample.is_delta { 0.0 } else { bsdf_pdf },
     });
     radiance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strata_are_1_to_64() {
+        assert!(check_splits(1).is_ok() && check_splits(MOST_SPLITS).is_ok());
+        assert!(check_splits(0).is_err() && check_splits(MOST_SPLITS + 1).is_err());
+    }
 }

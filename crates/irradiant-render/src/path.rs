@@ -7,7 +7,7 @@
 
 use crate::camera_samples::{CameraSample, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use crate::light_samples::{MOST_SPLITS, direct_light, samples_of};
+use crate::light_samples::{MOST_SPLITS, check_splits, direct_light, samples_of};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
 use irradiant_core::bsdf::Bsdf;
@@ -31,7 +31,7 @@ pub struct PathIntegrator {
     pub regularize: bool,
     /// When paths end by chance.
     pub roulette: Roulette,
-    /// Strata of the choice of a light at the first surface, 1 or more.
+    /// Strata of the choice of a light at the first surface, 1 to 64.
     pub light_splits: u32,
 }
 
@@ -93,6 +93,10 @@ impl Integrator for PathIntegrator {
                 self.radiance_from(first, scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
             },
         );
+    }
+
+    fn check(&self, _: &Scene) -> Result<(), String> {
+        check_splits(self.light_splits)
     }
 
     fn limits(&self) -> Vec<Limit> {

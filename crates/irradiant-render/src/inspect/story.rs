@@ -257,10 +257,9 @@ impl Bookkeeper<'_> {
             if asks {
                 let splits = integrator.light_splits_at(depth);
                 let picked = PickedLights::of(scene, &at, &self.stream.light(depth), splits);
-                let strata: u32 = if scene.lights.as_slice().len() == 1 { 1 } else { splits };
-                for &(light, times) in picked.as_slice() {
+                for (light, share) in picked.iter() {
                     let c = found(Technique::LightSample, depth + 1).find(|c| c.light == light.id);
-                    let pmf = f64::from(light.pmf) * f64::from(strata) / f64::from(times);
+                    let pmf = f64::from(light.pmf) / f64::from(share);
                     let tried = self.light(&at, &bsdf, &lambda, depth, light.id, pmf, c, story);
                     story.vertices[depth as usize].lights.extend(tried);
                 }

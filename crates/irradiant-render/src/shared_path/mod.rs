@@ -24,7 +24,7 @@ mod share;
 
 use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
-use crate::light_samples::{direct_light, pick_light};
+use crate::light_samples::{check_splits, direct_light, pick_light};
 use crate::path::{PathIntegrator, Previous, Walk, lights_option, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
 use crate::registry::{IntegratorEntry, LIGHT_SAMPLER};
@@ -61,7 +61,7 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
 pub struct SharedPathIntegrator {
     /// Scattering events at most; `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Strata of the choice of a light at the first surface, 1 or more.
+    /// Strata of the choice of a light at the first surface, 1 to 64.
     pub light_splits: u32,
 }
 
@@ -157,6 +157,7 @@ impl Integrator for SharedPathIntegrator {
     }
 
     fn check(&self, scene: &Scene) -> Result<(), String> {
+        check_splits(self.light_splits)?;
         if scene.materials.may_pass() {
             return Err(
                 "sharedpath cannot join surfaces through mixes that hold an interface; --integrator path can".into()
@@ -402,10 +403,10 @@ impl SharedPathIntegrator {
         walk.roulette_scale = importance;
         walk.throughput = SampledSpectrum::splat(1.0 / survival);
         path.go(scene, at, bsdf, &drawn, &mut walk, stats);
-        // Weights other than 0 and 1 against light samples are found when all see it: with density 1 for the direction only what
-        // light samples cannot find has the weight 1.
+        // What lamps send this way is weighed later, when it is known who sees the surface. So they are asked for twice: with any density of
+        // the direction (1), when [`Lamps`] catches what light samples find too and divides the weight out; and with none, when
+        // the rest of the path brings but what they cannot find.
         walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 1.0, specular: false, light_splits: 1 });
-        // Lamps that light samples could have found; then all else.
         let mut lamps = Lamps(drawn.wi, incoming);
         match walk.met {
             None => _ = path.escaped(scene, &walk, lambda, &mut lamps),
