@@ -113,7 +113,7 @@ pub(crate) const fn lights_option(default: u32) -> OptionEntry {
         name: "lights",
         range: OptionRange::Count(1, MOST_SPLITS),
         default: Value::Count(default),
-        doc: "light samples at the first surface, at most one of each light (A59)",
+        doc: "light samples at the first surface: one of each light, or of so many lights that are picked (A59)",
     }
 }
 
@@ -462,7 +462,7 @@ impl PathIntegrator {
             }
             let light_pdf = previous
                 .filter(|p| !p.specular)
-                .map_or(0.0, |p| samples_of(scene.light_sampler.pmf(&p.reference, light), p.light_splits) * pdf);
+                .map_or(0.0, |p| samples_of(scene, &p.reference, light, p.light_splits) * pdf);
             let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
             let radiance = walk.throughput * emitted * weight;
@@ -497,7 +497,7 @@ impl PathIntegrator {
             return SampledSpectrum::ZERO;
         }
         let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
-            samples_of(scene.light_sampler.pmf(&p.reference, light), p.light_splits)
+            samples_of(scene, &p.reference, light, p.light_splits)
                 * scene.lights.get(light).pdf_hit(&p.reference, ray.d, &at.into())
         });
         let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);

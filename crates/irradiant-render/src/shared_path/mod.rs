@@ -52,7 +52,7 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "sharedpath",
     promise: "path tracing whose indirect light is shared among the pixels of a block",
     source: "Bekaert, Sbert and Halton 2002",
-    options: &[lights_option(4), LIGHT_SAMPLER],
+    options: &[lights_option(8), LIGHT_SAMPLER],
     make: |options, max_depth| Box::new(SharedPathIntegrator { max_depth, light_splits: options.count("lights") }),
 };
 
