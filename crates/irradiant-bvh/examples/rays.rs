@@ -172,30 +172,55 @@ fn main() {
         ("bounce 2", bounce2, false),
         ("shadow", shadow(&first), true),
     ];
-    println!("{:<10}{}", "Mray/s", sets.iter().map(|s| format!("{:>10}", s.0)).collect::<String>());
+    println!("{:<12}{}", "Mray/s", sets.iter().map(|s| format!("{:>10}", s.0)).collect::<String>());
     for level in Level::available().into_iter().rev() {
-        let mut line = format!("{:<10}", format!("{level:?}"));
-        let mut sums = Vec::new();
-        for (_, rays, any) in &sets {
-            let mut best = f64::INFINITY;
-            let mut sum = 0.0;
-            for _ in 0..if level < Level::Sse { 1 } else { passes } {
-                let (total, seconds) = timed(|| {
-                    let mut total = 0.0f64;
-                    for ray in rays {
-                        if *any {
-                            total += f64::from(u8::from(bvh.occluded(level, ray, &TrianglesOnly)));
-                        } else if let Some(hit) = bvh.intersect(level, ray, &TrianglesOnly) {
-                            total += f64::from(hit.t());
-                        }
-                    }
-                    total
-                });
-                (best, sum) = (best.min(seconds), total);
-            }
-            line += &format!("{:>10.2}", rays.len() as f64 / best * 1e-6);
-            sums.push(sum);
-        }
-        println!("{line}   sums {sums:.4?}");
+        let passes = if level < Level::Sse { 1 } else { passes };
+        report_rates(&format!("{level:?}"), &sets, passes, |rays, any| one_by_one(&bvh, level, rays, any));
+        report_rates(&format!("{level:?} x256"), &sets, passes, |rays, any| in_batches(&bvh, level, rays, any));
     }
+}
+
+/// Prints rates of all sets, the best of some passes, and what `trace` makes of each.
+fn report_rates(name: &str, sets: &[(&str, Vec<Ray>, bool)], passes: usize, trace: impl Fn(&[Ray], bool) -> f64) {
+    let mut line = format!("{name:<12}");
+    let mut sums = Vec::new();
+    for (_, rays, any) in sets {
+        let (mut best, mut sum) = (f64::INFINITY, 0.0);
+        for _ in 0..passes {
+            let (total, seconds) = timed(|| trace(rays, *any));
+            (best, sum) = (best.min(seconds), total);
+        }
+        line += &format!("{:>10.2}", rays.len() as f64 / best * 1e-6);
+        sums.push(sum);
+    }
+    println!("{line}   sums {sums:.4?}");
+}
+
+/// The sum of all distances, or the number of rays that meet something.
+fn one_by_one(bvh: &Bvh, level: Level, rays: &[Ray], any: bool) -> f64 {
+    let mut total = 0.0;
+    for ray in rays {
+        if any {
+            total += f64::from(u8::from(bvh.occluded(level, ray, &TrianglesOnly)));
+        } else if let Some(hit) = bvh.intersect(level, ray, &TrianglesOnly) {
+            total += f64::from(hit.t());
+        }
+    }
+    total
+}
+
+/// As [`one_by_one`], 256 rays at a time.
+fn in_batches(bvh: &Bvh, level: Level, rays: &[Ray], any: bool) -> f64 {
+    let (mut hits, mut blocked) = ([None; 256], [false; 256]);
+    let mut total = 0.0;
+    for rays in rays.chunks(256) {
+        if any {
+            bvh.occluded_batch(level, rays, &TrianglesOnly, &mut blocked[..rays.len()]);
+            total += blocked[..rays.len()].iter().filter(|b| **b).count() as f64;
+        } else {
+            bvh.intersect_batch(level, rays, &TrianglesOnly, &mut hits[..rays.len()]);
+            total += hits[..rays.len()].iter().flatten().map(|hit| f64::from(hit.t())).sum::<f64>();
+        }
+    }
+    total
 }
