@@ -39,11 +39,12 @@ impl Instances<'_> {
     }
 
     /// The ray in the space of an instance: distances along it stay the same.
+    #[inline]
     fn inside(&self, user: u32, ray: &Ray) -> (&Bvh, Ray) {
         let p = &self.placements[user as usize];
         let shrink = 1.0 / p.size;
         let (o, d) = (scale(sub(ray.o, p.origin), shrink), scale(ray.d, shrink));
-        (&self.parts[p.mesh], Ray { o, d, ..*ray })
+        (&self.parts[p.mesh], Ray { o, t_max: ray.t_max, d, time: ray.time })
     }
 }
 

@@ -241,14 +241,27 @@ pub(crate) mod x86 {
         }
     }
 
-    /// The walks compiled for one set of features, behind a check that the machine has them.
+    /// The walks compiled for one set of features, behind a check that the machine has them. Rays go in as eight numbers, in
+    /// registers: reading four at once from memory, just after they were written one by one, has to wait for the writes.
     macro_rules! entry_points {
         ($closest:ident, $any:ident, $closest_packet:ident, $any_packet:ident, $wide:ty, $level:expr, $features:literal) => {
             #[inline]
             #[allow(unsafe_code)]
             pub(crate) fn $closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
                 #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    ox: f32,
+                    oy: f32,
+                    oz: f32,
+                    t_max: f32,
+                    dx: f32,
+                    dy: f32,
+                    dz: f32,
+                    time: f32,
+                    leaves: &L,
+                ) -> Option<Closest<L::UserHit>> {
+                    let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
                         walk::closest::<Fused, L>(bvh, ray, leaves)
                     } else {
@@ -256,15 +269,28 @@ pub(crate) mod x86 {
                     }
                 }
                 assert!($level <= Level::detect());
+                let &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time } = ray;
                 // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
-                unsafe { compiled(bvh, ray, leaves) }
+                unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
             }
 
             #[inline]
             #[allow(unsafe_code)]
             pub(crate) fn $any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
                 #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    ox: f32,
+                    oy: f32,
+                    oz: f32,
+                    t_max: f32,
+                    dx: f32,
+                    dy: f32,
+                    dz: f32,
+                    time: f32,
+                    leaves: &L,
+                ) -> bool {
+                    let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
                         walk::any::<Fused, L>(bvh, ray, leaves)
                     } else {
@@ -272,8 +298,9 @@ pub(crate) mod x86 {
                     }
                 }
                 assert!($level <= Level::detect());
+                let &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time } = ray;
                 // SAFETY: as above.
-                unsafe { compiled(bvh, ray, leaves) }
+                unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
             }
 
             #[inline]

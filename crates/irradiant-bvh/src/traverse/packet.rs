@@ -98,9 +98,9 @@ struct Packet<'a, E, B: BoxTest> {
 }
 
 impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
-    /// `None` if these rays cannot travel together.
+    /// With their ends, minus infinity for lanes without a ray. `None` if these rays cannot travel together.
     #[inline(always)]
-    fn new(rays: &'a [Ray]) -> Option<Self> {
+    fn new(rays: &'a [Ray]) -> Option<(Self, Column)> {
         if !may_go_the_same_way(rays) {
             return None;
         }
@@ -114,7 +114,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
             }
             columns[6].0[i] = ray.t_max;
         }
-        let [ox, oy, oz, dx, dy, dz, t] = columns;
+        let [ox, oy, oz, dx, dy, dz, mut t] = columns;
         let load = |column: Column| E::load(&column.0);
         let (o, d) = ([load(ox), load(oy), load(oz)], [load(dx), load(dy), load(dz)]);
         let (one, limit) = (E::splat(1.0), E::splat(FUSED_LIMIT));
@@ -130,6 +130,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         if sound.mask() != E::ALL {
             return None;
         }
+        t.0[rays.len()..].fill(f32::NEG_INFINITY);
 
         let size = rays[0].d.iter().fold(0.0f32, |size, x| size.max(x.abs()));
         let splat = <B::Eight as Lanes>::splat;
@@ -169,7 +170,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         let axes = same_axes(&d);
         let [x, y, z] = axes.unwrap_or([0, 1, 2]);
         let shear = [(d[x] * minus) / d[z], (d[y] * minus) / d[z], one / d[z]];
-        Some(Self {
+        let packet = Self {
             rays,
             intervals,
             inverse,
@@ -180,7 +181,8 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
             origin: [o[x], o[y], o[z]],
             shear,
             shears: shear.map(|lanes| Column(lanes.to_array())),
-        })
+        };
+        Some((packet, t))
     }
 
     /// Bit `i` says that some ray may enter child `i` before `far`, and then not before `near[i]`.
@@ -391,16 +393,6 @@ fn gathered(mask: u32, ray: impl Fn(usize) -> Ray) -> ([Ray; PACKET], [usize; PA
     (rays, which, n)
 }
 
-/// Ends of rays; that of no ray is before all beginnings.
-#[inline(always)]
-fn ends(rays: &[Ray]) -> Column {
-    let mut t = Column([f32::NEG_INFINITY; PACKET]);
-    for (t, ray) in t.0.iter_mut().zip(rays) {
-        *t = ray.t_max;
-    }
-    t
-}
-
 /// As [`walk::closest`] for each of up to [`PACKET`] rays.
 #[inline(always)]
 pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
@@ -412,8 +404,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     if bvh.nodes.is_empty() || rays.len() <= FEW as usize {
         return false;
     }
-    let Some(packet) = Packet::<E, B>::new(rays) else { return false };
-    let mut t = ends(rays);
+    let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
     let mut best: [Best<L::UserHit>; PACKET] = std::array::from_fn(|i| Best::new(t.0[i]));
     let mut far = t.greatest();
     let mut waiting = Waiting { stack: Stack::new(), n: 0 };
@@ -476,9 +467,8 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     if bvh.nodes.is_empty() || rays.len() <= FEW as usize {
         return false;
     }
-    let Some(packet) = Packet::<E, B>::new(rays) else { return false };
     // Rays that have met something end before they begin.
-    let mut t = ends(rays);
+    let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
     let mut far = t.greatest();
     let mut waiting = Waiting { stack: Stack::new(), n: 0 };
     out.fill(false);
