@@ -11,7 +11,7 @@ use crate::ray::Ray;
 pub(crate) struct Near(pub [f32; WIDTH]);
 
 /// What `plane * inverse - origin * inverse` may lose against `(plane - origin) * inverse`, as a share of its second product:
-/// two roundings of it, twice over.
+/// two roundings of it, twice over; or three and more, where lanes have no fused operation.
 pub(super) const FUSED_LOST: f32 = 1.0 / (1 << 22) as f32;
 /// Where reciprocals and products with the origin are below, nothing overflows in the fused form.
 pub(super) const FUSED_LIMIT: f32 = 1e30;
@@ -166,13 +166,16 @@ pub(crate) mod x86 {
     }
 
     impl Fused {
-        /// Whether nothing overflows: every other ray takes [`Whole`].
+        /// Whether the ray is proper and nothing overflows: every other ray takes [`Whole`].
         #[inline(always)]
         pub(crate) fn suits(ray: &Ray) -> bool {
             let (o, d) = ray.lanes::<Sse>();
             let (inverse, limit) = (Sse::splat(1.0) / d, Sse::splat(FUSED_LIMIT));
-            // Of the three axes; NaN fails.
-            (inverse.abs().lt(limit) & (o * inverse).abs().lt(limit)).mask() & 7 == 7
+            let size = inverse.abs();
+            // Of the three axes; NaN fails. A reciprocal that is finite and not zero is that of a proper direction, and a
+            // finite product with it that of a finite origin.
+            let sound = Sse::splat(0.0).lt(size) & size.lt(limit) & (o * inverse).abs().lt(limit);
+            sound.mask() & 7 == 7 && ray.t_max > 0.0
         }
     }
 
@@ -263,7 +266,7 @@ pub(crate) mod x86 {
                 ) -> Option<Closest<L::UserHit>> {
                     let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
-                        walk::closest::<Fused, L>(bvh, ray, leaves)
+                        walk::closest_of_proper::<Fused, L>(bvh, ray, leaves)
                     } else {
                         walk::closest::<Whole, L>(bvh, ray, leaves)
                     }
@@ -292,7 +295,7 @@ pub(crate) mod x86 {
                 ) -> bool {
                     let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
-                        walk::any::<Fused, L>(bvh, ray, leaves)
+                        walk::any_of_proper::<Fused, L>(bvh, ray, leaves)
                     } else {
                         walk::any::<Whole, L>(bvh, ray, leaves)
                     }
