@@ -25,13 +25,26 @@ struct Instances<'a> {
     level: Level,
 }
 
+/// As many rays as a tree asks about at once.
+const MANY: usize = 16;
+
 impl Instances<'_> {
+    /// The same for up to [`MANY`] rays.
+    fn all_inside(&self, user: u32, rays: &[Ray]) -> (&Bvh, [Ray; MANY]) {
+        let mut local = [Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; MANY];
+        for (local, ray) in local.iter_mut().zip(rays) {
+            *local = self.inside(user, ray).1;
+        }
+        (&self.parts[self.placements[user as usize].mesh], local)
+    }
+
     /// The ray in the space of an instance: distances along it stay the same.
+    #[inline]
     fn inside(&self, user: u32, ray: &Ray) -> (&Bvh, Ray) {
         let p = &self.placements[user as usize];
         let shrink = 1.0 / p.size;
         let (o, d) = (scale(sub(ray.o, p.origin), shrink), scale(ray.d, shrink));
-        (&self.parts[p.mesh], Ray { o, d, ..*ray })
+        (&self.parts[p.mesh], Ray { o, t_max: ray.t_max, d, time: ray.time })
     }
 }
 
@@ -49,6 +62,24 @@ impl Leaves for Instances<'_> {
     fn occluded(&self, user: u32, ray: &Ray) -> bool {
         let (part, ray) = self.inside(user, ray);
         part.occluded(self.level, &ray, &TrianglesOnly)
+    }
+
+    // As in irradiant-core: rays that reach an instance together go on together.
+    fn intersect_many(&self, user: u32, rays: &[Ray], hits: &mut [Option<(f32, Hit)>]) {
+        let (part, rays) = self.all_inside(user, rays);
+        let mut found = [None; MANY];
+        part.intersect_batch(self.level, &rays[..hits.len()], &TrianglesOnly, &mut found[..hits.len()]);
+        for (hit, found) in hits.iter_mut().zip(found) {
+            *hit = match found {
+                Some(Closest::Triangle(hit)) => Some((hit.t, hit)),
+                _ => None,
+            };
+        }
+    }
+
+    fn occluded_many(&self, user: u32, rays: &[Ray], out: &mut [bool]) {
+        let (part, rays) = self.all_inside(user, rays);
+        part.occluded_batch(self.level, &rays[..out.len()], &TrianglesOnly, out);
     }
 }
 

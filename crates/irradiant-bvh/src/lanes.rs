@@ -1,7 +1,7 @@
-//! Four or eight floats at a time, each lane an unfused IEEE operation.
+//! Four, eight or sixteen floats at a time, each lane an unfused IEEE operation (but for `multiply_add`).
 //!
 //! `Portable` is arrays and loops and is what other architectures get; `Sse` is the x86-64 baseline; `Twice` is two of
-//! either, and `Avx` eight in one register. Comparisons give all-ones or all-zeros lanes. `min(a, b)` is `if a < b { a } else { b }` lane by lane, so a NaN in `a` gives `b`.
+//! either, `Avx` eight in one register, `Pair` two of eight, and `Avx512` sixteen in one register. Comparisons give all-ones or all-zeros lanes. `min(a, b)` is `if a < b { a } else { b }` lane by lane, so a NaN in `a` gives `b`.
 
 use std::ops::{Add, BitAnd, BitOr, Div, IndexMut, Mul, Sub};
 
@@ -15,7 +15,7 @@ pub(crate) trait Lanes:
     + BitAnd<Output = Self>
     + BitOr<Output = Self>
 {
-    /// `[f32; 4]` or `[f32; 8]`.
+    /// `[f32; 4]`, `[f32; 8]` or `[f32; 16]`.
     type Array: Copy + IndexMut<usize, Output = f32>;
     /// One bit for each lane.
     const ALL: u32;
@@ -25,6 +25,11 @@ pub(crate) trait Lanes:
     fn min(self, b: Self) -> Self;
     fn max(self, b: Self) -> Self;
     fn abs(self) -> Self;
+    /// `self * b + c` with one rounding where the lanes have such an operation, else with two.
+    #[inline(always)]
+    fn multiply_add(self, b: Self, c: Self) -> Self {
+        self * b + c
+    }
     fn lt(self, b: Self) -> Self;
     fn le(self, b: Self) -> Self;
     /// Bit `i` is the sign bit of lane `i`.
@@ -133,13 +138,9 @@ impl Lanes for Portable {
     }
 }
 
-/// Eight lanes as two times four.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Twice<F>(F, F);
-
-macro_rules! twice_operator {
-    ($trait:ident, $method:ident) => {
-        impl<F: Lanes> $trait for Twice<F> {
+macro_rules! doubled_operator {
+    ($type:ident, $trait:ident, $method:ident) => {
+        impl<F: Lanes> $trait for $type<F> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, b: Self) -> Self {
@@ -148,55 +149,80 @@ macro_rules! twice_operator {
         }
     };
 }
-twice_operator!(Add, add);
-twice_operator!(Sub, sub);
-twice_operator!(Mul, mul);
-twice_operator!(Div, div);
-twice_operator!(BitAnd, bitand);
-twice_operator!(BitOr, bitor);
 
-impl<F: Lanes<Array = [f32; 4]>> Lanes for Twice<F> {
-    type Array = [f32; 8];
-    const ALL: u32 = 0xff;
-    #[inline(always)]
-    fn load(a: &[f32; 8]) -> Self {
-        let (halves, _) = a.as_chunks::<4>();
-        Self(F::load(&halves[0]), F::load(&halves[1]))
-    }
-    #[inline(always)]
-    fn splat(a: f32) -> Self {
-        Self(F::splat(a), F::splat(a))
-    }
-    #[inline(always)]
-    fn to_array(self) -> [f32; 8] {
-        let ([a, b, c, d], [e, f, g, h]) = (self.0.to_array(), self.1.to_array());
-        [a, b, c, d, e, f, g, h]
-    }
-    #[inline(always)]
-    fn min(self, b: Self) -> Self {
-        Self(self.0.min(b.0), self.1.min(b.1))
-    }
-    #[inline(always)]
-    fn max(self, b: Self) -> Self {
-        Self(self.0.max(b.0), self.1.max(b.1))
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.abs(), self.1.abs())
-    }
-    #[inline(always)]
-    fn lt(self, b: Self) -> Self {
-        Self(self.0.lt(b.0), self.1.lt(b.1))
-    }
-    #[inline(always)]
-    fn le(self, b: Self) -> Self {
-        Self(self.0.le(b.0), self.1.le(b.1))
-    }
-    #[inline(always)]
-    fn mask(self) -> u32 {
-        self.0.mask() | self.1.mask() << 4
-    }
+/// Lanes of twice the number, as two of another.
+macro_rules! doubled {
+    ($(#[$doc:meta])* $type:ident, $half:literal, $whole:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) struct $type<F>(F, F);
+
+        doubled_operator!($type, Add, add);
+        doubled_operator!($type, Sub, sub);
+        doubled_operator!($type, Mul, mul);
+        doubled_operator!($type, Div, div);
+        doubled_operator!($type, BitAnd, bitand);
+        doubled_operator!($type, BitOr, bitor);
+
+        impl<F: Lanes<Array = [f32; $half]>> Lanes for $type<F> {
+            type Array = [f32; $whole];
+            const ALL: u32 = F::ALL << $half | F::ALL;
+            #[inline(always)]
+            fn load(a: &[f32; $whole]) -> Self {
+                let (halves, _) = a.as_chunks::<$half>();
+                Self(F::load(&halves[0]), F::load(&halves[1]))
+            }
+            #[inline(always)]
+            fn splat(a: f32) -> Self {
+                Self(F::splat(a), F::splat(a))
+            }
+            #[inline(always)]
+            fn to_array(self) -> [f32; $whole] {
+                let (low, high) = (self.0.to_array(), self.1.to_array());
+                let mut a = [0.0; $whole];
+                a[..$half].copy_from_slice(&low);
+                a[$half..].copy_from_slice(&high);
+                a
+            }
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                Self(self.0.min(b.0), self.1.min(b.1))
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                Self(self.0.max(b.0), self.1.max(b.1))
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                Self(self.0.abs(), self.1.abs())
+            }
+            #[inline(always)]
+            fn multiply_add(self, b: Self, c: Self) -> Self {
+                Self(self.0.multiply_add(b.0, c.0), self.1.multiply_add(b.1, c.1))
+            }
+            #[inline(always)]
+            fn lt(self, b: Self) -> Self {
+                Self(self.0.lt(b.0), self.1.lt(b.1))
+            }
+            #[inline(always)]
+            fn le(self, b: Self) -> Self {
+                Self(self.0.le(b.0), self.1.le(b.1))
+            }
+            #[inline(always)]
+            fn mask(self) -> u32 {
+                self.0.mask() | self.1.mask() << $half
+            }
+        }
+    };
 }
+doubled!(
+    /// Eight lanes as two times four.
+    Twice, 4, 8
+);
+doubled!(
+    /// Sixteen lanes as two times eight.
+    Pair, 8, 16
+);
 
 impl<F: Lanes<Array = [f32; 4]>> Eight for Twice<F> {
     #[inline(always)]
@@ -207,7 +233,7 @@ impl<F: Lanes<Array = [f32; 4]>> Eight for Twice<F> {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use avx::Avx;
+pub(crate) use avx::{Avx, Avx512};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use sse::Sse;
 
@@ -333,9 +359,9 @@ mod avx {
     /// Calls intrinsics of AVX.
     macro_rules! avx {
         ($e:expr) => {
-            // SAFETY: only code compiled for AVX2 behind a check that the machine has it uses `Avx` (the entry points
-            // of `traverse`), and the only pointers are to whole `[f32; 8]`s, read or written unaligned.
-            // Guard: `avx_lanes_agree_with_portable_ones`.
+            // SAFETY: only code compiled for AVX2 and FMA (AVX-512) behind a check that the machine has it uses `Avx`
+            // (`Avx512`): the entry points of `traverse`. The only pointers are to whole `[f32; 8]`s (`[f32; 16]`s), read
+            // or written unaligned. Guards: `avx_lanes_agree_with_portable_ones`, `avx512_lanes_agree_with_portable_ones`.
             unsafe { $e }
         };
     }
@@ -345,8 +371,8 @@ mod avx {
     pub(crate) struct Avx(__m256);
 
     macro_rules! operator {
-        ($trait:ident, $method:ident, $intrinsic:ident) => {
-            impl $trait for Avx {
+        ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
+            impl $trait for $type {
                 type Output = Self;
                 #[inline(always)]
                 fn $method(self, b: Self) -> Self {
@@ -355,12 +381,72 @@ mod avx {
             }
         };
     }
-    operator!(Add, add, _mm256_add_ps);
-    operator!(Sub, sub, _mm256_sub_ps);
-    operator!(Mul, mul, _mm256_mul_ps);
-    operator!(Div, div, _mm256_div_ps);
-    operator!(BitAnd, bitand, _mm256_and_ps);
-    operator!(BitOr, bitor, _mm256_or_ps);
+    operator!(Avx, Add, add, _mm256_add_ps);
+    operator!(Avx, Sub, sub, _mm256_sub_ps);
+    operator!(Avx, Mul, mul, _mm256_mul_ps);
+    operator!(Avx, Div, div, _mm256_div_ps);
+    operator!(Avx, BitAnd, bitand, _mm256_and_ps);
+    operator!(Avx, BitOr, bitor, _mm256_or_ps);
+
+    /// Sixteen lanes of AVX-512 F and DQ.
+    #[derive(Clone, Copy, Debug)]
+    #[repr(transparent)]
+    pub(crate) struct Avx512(__m512);
+
+    operator!(Avx512, Add, add, _mm512_add_ps);
+    operator!(Avx512, Sub, sub, _mm512_sub_ps);
+    operator!(Avx512, Mul, mul, _mm512_mul_ps);
+    operator!(Avx512, Div, div, _mm512_div_ps);
+    operator!(Avx512, BitAnd, bitand, _mm512_and_ps);
+    operator!(Avx512, BitOr, bitor, _mm512_or_ps);
+
+    /// Masks become lanes and lanes masks again; the compiler leaves out both.
+    impl Lanes for Avx512 {
+        type Array = [f32; 16];
+        const ALL: u32 = 0xffff;
+        #[inline(always)]
+        fn load(a: &[f32; 16]) -> Self {
+            Self(avx!(_mm512_loadu_ps(a.as_ptr())))
+        }
+        #[inline(always)]
+        fn splat(a: f32) -> Self {
+            Self(avx!(_mm512_set1_ps(a)))
+        }
+        #[inline(always)]
+        fn to_array(self) -> [f32; 16] {
+            let mut a = [0.0; 16];
+            avx!(_mm512_storeu_ps(a.as_mut_ptr(), self.0));
+            a
+        }
+        #[inline(always)]
+        fn min(self, b: Self) -> Self {
+            Self(avx!(_mm512_min_ps(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn max(self, b: Self) -> Self {
+            Self(avx!(_mm512_max_ps(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            Self(avx!(_mm512_abs_ps(self.0)))
+        }
+        #[inline(always)]
+        fn multiply_add(self, b: Self, c: Self) -> Self {
+            Self(avx!(_mm512_fmadd_ps(self.0, b.0, c.0)))
+        }
+        #[inline(always)]
+        fn lt(self, b: Self) -> Self {
+            Self(avx!(_mm512_castsi512_ps(_mm512_movm_epi32(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, b.0)))))
+        }
+        #[inline(always)]
+        fn le(self, b: Self) -> Self {
+            Self(avx!(_mm512_castsi512_ps(_mm512_movm_epi32(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, b.0)))))
+        }
+        #[inline(always)]
+        fn mask(self) -> u32 {
+            u32::from(avx!(_mm512_movepi32_mask(_mm512_castps_si512(self.0))))
+        }
+    }
 
     impl Lanes for Avx {
         type Array = [f32; 8];
@@ -390,6 +476,10 @@ mod avx {
         #[inline(always)]
         fn abs(self) -> Self {
             Self(avx!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
+        }
+        #[inline(always)]
+        fn multiply_add(self, b: Self, c: Self) -> Self {
+            Self(avx!(_mm256_fmadd_ps(self.0, b.0, c.0)))
         }
         #[inline(always)]
         fn lt(self, b: Self) -> Self {
@@ -458,7 +548,7 @@ mod tests {
     #[test]
     #[allow(unsafe_code)]
     fn avx_lanes_agree_with_portable_ones() {
-        #[target_feature(enable = "avx2")]
+        #[target_feature(enable = "avx2,fma")]
         fn compiled(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
             let lanes = [Avx::load(&x), Avx::load(&y), Avx::splat(1.0)];
             let chosen = Avx::choose(lanes, WORDS).as_flattened().iter().map(|l| l.to_array()).collect::<Vec<_>>();
@@ -471,14 +561,34 @@ mod tests {
             [run::<P>(x, y), chosen].concat()
         }
         const WORDS: [u32; 3] = [0x7654_3210, 0x0123_4567, 0xf8f9_1122];
-        if !is_x86_feature_detected!("avx2") {
+        if !is_x86_feature_detected!("avx2") || !is_x86_feature_detected!("fma") {
             return;
         }
         for (i, &a) in VALUES.iter().enumerate() {
             for &b in &VALUES {
                 let (x, y) = ([a, b, b, a, 1.0, b, VALUES[(i + 1) % 12], -a], [b, a, a, 1.0, b, -b, 0.5, b]);
-                // SAFETY: the machine has AVX2.
+                // SAFETY: the machine has AVX2 and FMA.
                 same(&portable(x, y), &unsafe { compiled(x, y) });
+            }
+        }
+    }
+
+    #[test]
+    #[allow(unsafe_code)]
+    fn avx512_lanes_agree_with_portable_ones() {
+        #[target_feature(enable = "avx512f,avx512dq")]
+        fn compiled(x: [f32; 16], y: [f32; 16]) -> Vec<[f32; 16]> {
+            run::<Avx512>(x, y)
+        }
+        if !is_x86_feature_detected!("avx512f") || !is_x86_feature_detected!("avx512dq") {
+            return;
+        }
+        for (i, &a) in VALUES.iter().enumerate() {
+            for (j, &b) in VALUES.iter().enumerate() {
+                let x = std::array::from_fn(|k| if k == 5 { a } else { VALUES[(i + k) % 12] });
+                let y = std::array::from_fn(|k| if k == 3 { a } else { VALUES[(j + 5 * k) % 12].min(b) });
+                // SAFETY: the machine has AVX-512 F and DQ.
+                same(&run::<Pair<Twice<Portable>>>(x, y), &unsafe { compiled(x, y) });
             }
         }
     }
@@ -501,6 +611,8 @@ mod tests {
             F::splat(x[1]),
             F::splat(a.lt(b).mask() as f32),
             F::splat(a.mask() as f32),
+            F::splat((a.lt(b) & b.le(a.abs()) | a.le(b)).mask() as f32),
+            F::splat(2.0).multiply_add(F::splat(3.0), F::splat(0.5)),
         ];
         results.iter().map(|r| r.to_array()).collect()
     }

@@ -15,7 +15,7 @@ pub enum Level {
     Sse,
     /// AVX2 with FMA, BMI and LZCNT.
     Avx2,
-    /// AVX-512 F and VL on 256-bit vectors.
+    /// AVX-512 F, DQ and VL: sixteen rays of a packet in one register, single rays on 256-bit vectors.
     Avx512,
 }
 
@@ -44,7 +44,10 @@ impl Level {
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")
             && is_x86_feature_detected!("popcnt");
-        let avx512 = avx2 && is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl");
+        let avx512 = avx2
+            && is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl");
         match (avx2, avx512) {
             (_, true) => Self::Avx512,
             (true, false) => Self::Avx2,

@@ -3,10 +3,10 @@
 #[cfg(target_arch = "x86_64")]
 use super::boxes;
 use super::boxes::Halves;
-use super::packet::{self, GROUP, PACKET};
+use super::packet::{self, PACKET};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::Sse;
-use crate::lanes::{Portable, Twice};
+use crate::lanes::{Pair, Portable, Twice};
 use crate::level::Level;
 use crate::node::Bvh;
 use crate::ray::{Closest, Leaves, Ray};
@@ -29,14 +29,16 @@ impl Bvh {
         let level = level.min(Level::detect());
         let packet = |rays: &[Ray], out: &mut [Option<Closest<L::UserHit>>]| match level {
             Level::Scalar => false,
-            Level::Neon => packet::closest::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out),
+            Level::Neon => packet::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out),
             #[cfg(target_arch = "x86_64")]
-            Level::Sse => packet::closest::<Twice<Sse>, Halves<Sse>, L>(self, rays, leaves, out),
+            Level::Sse => packet::closest::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, leaves, out),
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512 => boxes::x86::closest_packet(self, rays, leaves, out),
+            Level::Avx2 => boxes::x86::closest_packet_avx2(self, rays, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => boxes::x86::closest_packet_avx512(self, rays, leaves, out),
             #[cfg(not(target_arch = "x86_64"))]
             Level::Sse | Level::Avx2 | Level::Avx512 => {
-                packet::closest::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out)
+                packet::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out)
             }
         };
         let single = |ray: &Ray| self.intersect(level, ray, leaves);
@@ -54,14 +56,16 @@ impl Bvh {
         let level = level.min(Level::detect());
         let packet = |rays: &[Ray], out: &mut [bool]| match level {
             Level::Scalar => false,
-            Level::Neon => packet::any::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out),
+            Level::Neon => packet::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out),
             #[cfg(target_arch = "x86_64")]
-            Level::Sse => packet::any::<Twice<Sse>, Halves<Sse>, L>(self, rays, leaves, out),
+            Level::Sse => packet::any::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, leaves, out),
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512 => boxes::x86::any_packet(self, rays, leaves, out),
+            Level::Avx2 => boxes::x86::any_packet_avx2(self, rays, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => boxes::x86::any_packet_avx512(self, rays, leaves, out),
             #[cfg(not(target_arch = "x86_64"))]
             Level::Sse | Level::Avx2 | Level::Avx512 => {
-                packet::any::<Twice<Portable>, Halves<Portable>, L>(self, rays, leaves, out)
+                packet::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out)
             }
         };
         let single = |ray: &Ray| self.occluded(level, ray, leaves);
@@ -69,7 +73,7 @@ impl Bvh {
     }
 }
 
-/// Tries packets, then single groups, then single rays; `packet` says whether it has answered.
+/// Tries packets, then halves of such, then single rays; `packet` says whether it has answered.
 #[inline(always)]
 fn in_packets<T>(
     rays: &[Ray],
@@ -81,8 +85,8 @@ fn in_packets<T>(
         if packet(rays, out) {
             continue;
         }
-        for (rays, out) in rays.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
-            if PACKET == GROUP || !packet(rays, out) {
+        for (rays, out) in rays.chunks(PACKET / 2).zip(out.chunks_mut(PACKET / 2)) {
+            if !packet(rays, out) {
                 for (ray, out) in rays.iter().zip(out) {
                     *out = single(ray);
                 }

@@ -1,7 +1,7 @@
 //! Batches against the same rays one by one, at every level. Exact: false alarms are impossible.
 //!
 //! Seen to fail when broken: the entry bound from one end of the interval of reciprocals only; the far end of the packet
-//! taken from one ray; rays of different fastest axes sheared alike.
+//! taken from one ray; rays of different fastest axes sheared alike; what the fused form loses not allowed for.
 
 use super::tests::{Balls, Random, Soup, ball, lattice_soup, random_soup, ray_at};
 use super::*;
@@ -114,6 +114,21 @@ fn batches_agree_at_extreme_scales() {
         mixed.push(far.triangles[0].map(|v| far.positions[v as usize]));
     }
     check("mixed scales", &mixed, 1.0, 1000);
+}
+
+#[test]
+fn batches_agree_far_from_the_origin_of_space() {
+    // Flat boxes and short ways beside large products with the origin, which the fused box test subtracts.
+    let near = lattice_soup(120, 4);
+    let mut far = near.clone();
+    far.positions.iter_mut().for_each(|p| *p = p.map(|x| x + 1000.0));
+    let bvh = far.build();
+    let rays = |random: &mut Random, n: usize| {
+        let mut rays = window(&near, 1.0, n, random);
+        rays.iter_mut().for_each(|ray| ray.o = ray.o.map(|x| x + 1000.0));
+        rays
+    };
+    same_as_single("far", &bvh, &TrianglesOnly, rays, 3000);
 }
 
 #[test]

@@ -10,6 +10,12 @@ use crate::ray::Ray;
 #[repr(C, align(32))]
 pub(crate) struct Near(pub [f32; WIDTH]);
 
+/// What `plane * inverse - origin * inverse` may lose against `(plane - origin) * inverse`, as a share of its second product:
+/// two roundings of it, twice over; or three and more, where lanes have no fused operation.
+pub(super) const FUSED_LOST: f32 = 1.0 / (1 << 22) as f32;
+/// Where reciprocals and products with the origin are below, nothing overflows in the fused form.
+pub(super) const FUSED_LIMIT: f32 = 1e30;
+
 /// A ray prepared for testing boxes.
 pub(crate) trait BoxTest: Copy {
     /// Lanes for triangles.
@@ -75,7 +81,7 @@ pub(crate) mod x86 {
     use core::arch::x86_64::*;
 
     use super::*;
-    use crate::lanes::{Avx, Sse};
+    use crate::lanes::{Avx, Avx512, Pair, Sse};
     use crate::level::Level;
     use crate::node::Bvh;
     use crate::ray::{Closest, Leaves};
@@ -160,16 +166,16 @@ pub(crate) mod x86 {
     }
 
     impl Fused {
-        /// Two roundings of the product with the origin, twice over.
-        const LOST: f32 = 1.0 / (1 << 22) as f32;
-
-        /// Whether nothing overflows: every other ray takes [`Whole`].
+        /// Whether the ray is proper and nothing overflows: every other ray takes [`Whole`].
         #[inline(always)]
         pub(crate) fn suits(ray: &Ray) -> bool {
             let (o, d) = ray.lanes::<Sse>();
-            let (inverse, limit) = (Sse::splat(1.0) / d, Sse::splat(1e30));
-            // Of the three axes; NaN fails.
-            (inverse.abs().lt(limit) & (o * inverse).abs().lt(limit)).mask() & 7 == 7
+            let (inverse, limit) = (Sse::splat(1.0) / d, Sse::splat(FUSED_LIMIT));
+            let size = inverse.abs();
+            // Of the three axes; NaN fails. A reciprocal that is finite and not zero is that of a proper direction, and a
+            // finite product with it that of a finite origin.
+            let sound = Sse::splat(0.0).lt(size) & size.lt(limit) & (o * inverse).abs().lt(limit);
+            sound.mask() & 7 == 7 && ray.t_max > 0.0
         }
     }
 
@@ -180,8 +186,8 @@ pub(crate) mod x86 {
         let (o, d) = ray.lanes::<Sse>();
         let inverse = Sse::splat(1.0) / d;
         let padded = inverse * Sse::splat(PADDING);
-        let (product, padded_product, lost) = (o * inverse, o * padded, Sse::splat(Fused::LOST));
-        let entering = product.abs() * Sse::splat(-Fused::LOST) - product;
+        let (product, padded_product, lost) = (o * inverse, o * padded, Sse::splat(FUSED_LOST));
+        let entering = product.abs() * Sse::splat(-FUSED_LOST) - product;
         let leaving = padded_product.abs() * lost - padded_product;
         let splat = |v: Sse| {
             let [x, y, z, _] = v.to_array();
@@ -238,74 +244,120 @@ pub(crate) mod x86 {
         }
     }
 
-    /// The walk compiled for one set of features, behind a check that the machine has them.
+    /// The walks compiled for one set of features, behind a check that the machine has them. Rays go in as eight numbers, in
+    /// registers: reading four at once from memory, just after they were written one by one, has to wait for the writes.
     macro_rules! entry_points {
-        ($closest:ident, $any:ident, $level:expr, $features:literal) => {
+        ($closest:ident, $any:ident, $closest_packet:ident, $any_packet:ident, $wide:ty, $level:expr, $features:literal) => {
             #[inline]
             #[allow(unsafe_code)]
             pub(crate) fn $closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
                 #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    ox: f32,
+                    oy: f32,
+                    oz: f32,
+                    t_max: f32,
+                    dx: f32,
+                    dy: f32,
+                    dz: f32,
+                    time: f32,
+                    leaves: &L,
+                ) -> Option<Closest<L::UserHit>> {
+                    let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
-                        walk::closest::<Fused, L>(bvh, ray, leaves)
+                        walk::closest_of_proper::<Fused, L>(bvh, ray, leaves)
                     } else {
                         walk::closest::<Whole, L>(bvh, ray, leaves)
                     }
                 }
                 assert!($level <= Level::detect());
+                let &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time } = ray;
                 // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
-                unsafe { compiled(bvh, ray, leaves) }
+                unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
             }
 
             #[inline]
             #[allow(unsafe_code)]
             pub(crate) fn $any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
                 #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    ox: f32,
+                    oy: f32,
+                    oz: f32,
+                    t_max: f32,
+                    dx: f32,
+                    dy: f32,
+                    dz: f32,
+                    time: f32,
+                    leaves: &L,
+                ) -> bool {
+                    let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
-                        walk::any::<Fused, L>(bvh, ray, leaves)
+                        walk::any_of_proper::<Fused, L>(bvh, ray, leaves)
                     } else {
                         walk::any::<Whole, L>(bvh, ray, leaves)
                     }
                 }
                 assert!($level <= Level::detect());
+                let &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time } = ray;
                 // SAFETY: as above.
-                unsafe { compiled(bvh, ray, leaves) }
+                unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
+            }
+
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $closest_packet<L: Leaves>(
+                bvh: &Bvh,
+                rays: &[Ray],
+                leaves: &L,
+                out: &mut [Option<Closest<L::UserHit>>],
+            ) -> bool {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    rays: &[Ray],
+                    leaves: &L,
+                    out: &mut [Option<Closest<L::UserHit>>],
+                ) -> bool {
+                    packet::closest::<$wide, Fused, L>(bvh, rays, leaves, out)
+                }
+                assert!($level <= Level::detect());
+                // SAFETY: as above.
+                unsafe { compiled(bvh, rays, leaves, out) }
+            }
+
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $any_packet<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
+                    packet::any::<$wide, Fused, L>(bvh, rays, leaves, out)
+                }
+                assert!($level <= Level::detect());
+                // SAFETY: as above.
+                unsafe { compiled(bvh, rays, leaves, out) }
             }
         };
     }
 
-    /// [`packet::closest`] compiled for AVX2.
-    #[inline]
-    #[allow(unsafe_code)]
-    pub(crate) fn closest_packet<L: Leaves>(
-        bvh: &Bvh,
-        rays: &[Ray],
-        leaves: &L,
-        out: &mut [Option<Closest<L::UserHit>>],
-    ) -> bool {
-        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-        fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [Option<Closest<L::UserHit>>]) -> bool {
-            packet::closest::<Avx, Whole, L>(bvh, rays, leaves, out)
-        }
-        assert!(Level::Avx2 <= Level::detect());
-        // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
-        unsafe { compiled(bvh, rays, leaves, out) }
-    }
-
-    /// [`packet::any`] compiled for AVX2.
-    #[inline]
-    #[allow(unsafe_code)]
-    pub(crate) fn any_packet<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
-        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-        fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
-            packet::any::<Avx, Whole, L>(bvh, rays, leaves, out)
-        }
-        assert!(Level::Avx2 <= Level::detect());
-        // SAFETY: as above.
-        unsafe { compiled(bvh, rays, leaves, out) }
-    }
-
-    entry_points!(closest_avx2, any_avx2, Level::Avx2, "avx2,fma,bmi1,bmi2,lzcnt,popcnt");
-    entry_points!(closest_avx512, any_avx512, Level::Avx512, "avx512f,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt");
+    entry_points!(
+        closest_avx2,
+        any_avx2,
+        closest_packet_avx2,
+        any_packet_avx2,
+        Pair<Avx>,
+        Level::Avx2,
+        "avx2,fma,bmi1,bmi2,lzcnt,popcnt"
+    );
+    entry_points!(
+        closest_avx512,
+        any_avx512,
+        closest_packet_avx512,
+        any_packet_avx512,
+        Avx512,
+        Level::Avx512,
+        "avx512f,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
+    );
 }

@@ -1,33 +1,30 @@
-//! Up to thirty-two rays that travel together, in groups of eight.
+//! Up to sixteen rays that travel together.
 //!
 //! A node's eight boxes are tested once for the whole packet, against the interval of its origins and that of its
 //! reciprocal directions: rounding is monotonic, so what the intervals miss every ray misses. What the packet enters
-//! is then tested ray by ray, eight rays and one box at a time. Where few rays remain they go on alone.
+//! is then tested ray by ray, sixteen rays and one box at a time. Where few rays remain they go on alone.
 //!
 //! A packet needs proper rays that move along every axis and go about the same way; others are sent in smaller packets,
 //! or alone from the start.
 
-use super::boxes::BoxTest;
+use super::boxes::{BoxTest, FUSED_LIMIT, FUSED_LOST};
 use super::scalar::counts;
 use super::walk::{self, Stack};
-use super::{Best, PADDING, is_proper};
+use super::{Best, PADDING};
 use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidate, Shear};
 
-/// Rays in a group.
-pub(crate) const GROUP: usize = 8;
-/// Groups in a packet.
-const GROUPS: usize = 2;
 /// Rays in a packet.
-pub(crate) const PACKET: usize = GROUP * GROUPS;
-/// This many rays or fewer go on alone.
+pub(crate) const PACKET: usize = 16;
+/// This many rays or fewer go on alone. With 4 primary rays were 5 to 9 % slower, with 1 as with 2.
 const FEW: u32 = 2;
-/// At a leaf, this many rays of a group or fewer are tested one by one, each against all triangles of a block.
+/// At a leaf, this many rays or fewer are tested one by one, each against all triangles of a block. With 2 or 5: no difference
+/// beyond noise.
 const FEW_AT_LEAF: u32 = 3;
-/// Directions of a packet differ by this much of their size along an axis at most. With 0.5 rays to wide lamps were 6 to
-/// 11 % slower than alone; with 0.15 they are within 2 %, and primary rays as before.
+/// Directions of a packet differ by this much of their size along an axis at most. Shadow rays to wide lamps, in batches
+/// against alone (two scenes): with 0.15 1.04 and 1.07, with 0.3 1.02 and 1.05, with 0.6 0.93 and 1.14.
 const SPREAD: f32 = 0.15;
 
 /// A child to visit, and where its box is.
@@ -39,13 +36,30 @@ struct Entry {
     slot: u32,
 }
 
-/// Rays side by side.
+/// One number of each ray.
 #[derive(Clone, Copy)]
-struct Group<E> {
-    origin: [E; 3],
-    inverse: [E; 3],
-    /// As in [`Shear`].
-    shear: [E; 3],
+#[repr(C, align(64))]
+struct Column([f32; PACKET]);
+
+impl Column {
+    /// Least and greatest. NaN may be passed over.
+    #[inline(always)]
+    fn range(&self) -> (f32, f32) {
+        (self.fold(|a, b| if a < b { a } else { b }), self.fold(|a, b| if a > b { a } else { b }))
+    }
+
+    #[inline(always)]
+    fn greatest(&self) -> f32 {
+        self.fold(|a, b| if a > b { a } else { b })
+    }
+
+    /// Halves with halves, which are vector operations.
+    #[inline(always)]
+    fn fold(&self, f: impl Fn(f32, f32) -> f32) -> f32 {
+        let a: [f32; 8] = std::array::from_fn(|i| f(self.0[i], self.0[i + 8]));
+        let b: [f32; 4] = std::array::from_fn(|i| f(a[i], a[i + 4]));
+        f(f(b[0], b[2]), f(b[1], b[3]))
+    }
 }
 
 /// An axis of the space of rays that a packet spans.
@@ -66,102 +80,129 @@ impl<E> Interval<E> {
     const BOTH: usize = usize::MAX;
 }
 
-struct Packet<'a, E> {
+/// Rays side by side. Lanes without a ray repeat the last one.
+struct Packet<'a, E, B: BoxTest> {
     rays: &'a [Ray],
-    groups: [Group<E>; GROUPS],
-    intervals: [Interval<E>; 3],
-    /// Of the shears, if it is the same for all.
+    intervals: [Interval<B::Eight>; 3],
+    /// Boxes are entered at `plane * inverse + entering` and left at `plane * padded + leaving`, as in [`super::boxes`],
+    /// where the fused form is explained.
+    inverse: [E; 3],
+    entering: [E; 3],
+    padded: [E; 3],
+    leaving: [E; 3],
+    /// Of the shears, if it is the same for all; then origins along those, and the shears.
     axes: Option<[usize; 3]>,
+    origin: [E; 3],
+    shear: [E; 3],
+    /// The shears again, to be looked up.
+    shears: [Column; 3],
 }
 
-impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
-    /// `None` if these rays cannot travel together.
+impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
+    /// With their ends, minus infinity for lanes without a ray. `None` if these rays cannot travel together.
     #[inline(always)]
-    fn new(rays: &'a [Ray]) -> Option<Self> {
-        if !go_the_same_way(rays) {
+    fn new(rays: &'a [Ray]) -> Option<(Self, Column)> {
+        if !may_go_the_same_way(rays) {
             return None;
         }
-        let mut columns = [[[0.0; GROUP]; GROUPS]; 6];
-        let axes = Shear::axes(&rays[0]);
-        let mut same_axes = true;
-        for i in 0..rays.len().next_multiple_of(GROUP).min(PACKET) {
-            let ray = &rays[i.min(rays.len() - 1)];
-            if !is_proper(ray) {
+        let mut columns = [Column([0.0; PACKET]); 7];
+        let last = &rays[rays.len() - 1];
+        for i in 0..PACKET {
+            let ray = rays.get(i).unwrap_or(last);
+            for k in 0..3 {
+                columns[k].0[i] = ray.o[k];
+                columns[3 + k].0[i] = ray.d[k];
+            }
+            columns[6].0[i] = ray.t_max;
+        }
+        let [ox, oy, oz, dx, dy, dz, mut t] = columns;
+        let load = |column: Column| E::load(&column.0);
+        let (o, d) = ([load(ox), load(oy), load(oz)], [load(dx), load(dy), load(dz)]);
+        let (one, limit) = (E::splat(1.0), E::splat(FUSED_LIMIT));
+        let inverse = [one / d[0], one / d[1], one / d[2]];
+        let product = [o[0] * inverse[0], o[1] * inverse[1], o[2] * inverse[2]];
+        // Proper, moving along every axis, and nothing overflows; NaN fails.
+        let infinity = E::splat(f32::INFINITY);
+        let mut sound = E::splat(0.0).lt(load(t));
+        for k in 0..3 {
+            sound = sound & inverse[k].abs().lt(limit) & product[k].abs().lt(limit);
+            sound = sound & o[k].abs().lt(infinity) & d[k].abs().lt(infinity);
+        }
+        if sound.mask() != E::ALL {
+            return None;
+        }
+        t.0[rays.len()..].fill(f32::NEG_INFINITY);
+
+        let size = rays[0].d.iter().fold(0.0f32, |size, x| size.max(x.abs()));
+        let splat = <B::Eight as Lanes>::splat;
+        let zero = splat(0.0);
+        let mut intervals = [Interval { first: 0, ahead: zero, behind: zero, least: zero, greatest: zero }; 3];
+        for k in 0..3 {
+            let ((o_min, o_max), (d_min, d_max)) = (columns[k].range(), columns[3 + k].range());
+            if d_max - d_min > SPREAD * size {
                 return None;
             }
-            same_axes &= Shear::axes(ray) == axes;
-            for k in 0..3 {
-                columns[k][i / GROUP][i % GROUP] = ray.o[k];
-                columns[3 + k][i / GROUP][i % GROUP] = ray.d[k];
-            }
-        }
-        let zero = E::splat(0.0);
-        let group = Group { origin: [zero; 3], inverse: [zero; 3], shear: [zero; 3] };
-        let interval = Interval { first: 0, ahead: zero, behind: zero, least: zero, greatest: zero };
-        let axes = same_axes.then_some(axes);
-        let mut packet = Self { rays, groups: [group; GROUPS], intervals: [interval; 3], axes };
-        let n = packet.n_groups();
-        for k in 0..3 {
-            let (o_min, o_max) = range(&columns[k][..n]);
-            let (d_min, d_max) = range(&columns[3 + k][..n]);
-            let (mut least_forward, mut least_backward) = (1.0 / d_max, 1.0 / d_min);
-            for g in 0..n {
-                let d = E::load(&columns[3 + k][g]);
-                let inverse = E::splat(1.0) / d;
-                if inverse.abs().le(E::splat(f32::MAX)).mask() != E::ALL {
-                    return None;
-                }
-                packet.groups[g].inverse[k] = inverse;
-                packet.groups[g].origin[k] = E::load(&columns[k][g]);
-            }
-            let (first, behind, ahead) = if d_min > 0.0 {
-                (2 * k, o_min, o_max)
+            let (forward, backward) = (1.0 / d_max, 1.0 / d_min);
+            let (first, behind, ahead, least, greatest) = if d_min > 0.0 {
+                (2 * k, o_min, o_max, forward, backward)
             } else if d_max < 0.0 {
-                (2 * k + 1, o_max, o_min)
+                (2 * k + 1, o_max, o_min, backward, forward)
             } else {
-                (Interval::<E>::BOTH, o_min, o_max)
+                (Interval::<E>::BOTH, o_min, o_max, forward, backward)
             };
-            if first == 2 * k + 1 {
-                (least_forward, least_backward) = (least_backward, least_forward);
-            }
-            packet.intervals[k] = Interval {
+            intervals[k] = Interval {
                 first,
-                ahead: E::splat(ahead),
-                behind: E::splat(behind),
-                least: E::splat(least_forward),
-                greatest: E::splat(least_backward),
+                ahead: splat(ahead),
+                behind: splat(behind),
+                least: splat(least),
+                greatest: splat(greatest),
             };
         }
-        if let Some([x, y, z]) = axes {
-            let minus = E::splat(-1.0);
-            for g in 0..n {
-                let d = |axis: usize| E::load(&columns[3 + axis][g]);
-                packet.groups[g].shear = [(d(x) * minus) / d(z), (d(y) * minus) / d(z), E::splat(1.0) / d(z)];
-            }
-        }
-        Some(packet)
-    }
 
-    #[inline(always)]
-    fn n_groups(&self) -> usize {
-        self.rays.len().div_ceil(GROUP).min(GROUPS)
+        let (padding, lost) = (E::splat(PADDING), E::splat(FUSED_LOST));
+        let (zero, minus) = (E::splat(0.0), E::splat(-1.0));
+        let (mut entering, mut padded, mut leaving) = ([zero; 3], [zero; 3], [zero; 3]);
+        for k in 0..3 {
+            padded[k] = inverse[k] * padding;
+            let padded_product = o[k] * padded[k];
+            entering[k] = product[k] * minus - product[k].abs() * lost;
+            leaving[k] = padded_product.abs() * lost - padded_product;
+        }
+        let axes = same_axes(&d);
+        let [x, y, z] = axes.unwrap_or([0, 1, 2]);
+        let shear = [(d[x] * minus) / d[z], (d[y] * minus) / d[z], one / d[z]];
+        let packet = Self {
+            rays,
+            intervals,
+            inverse,
+            entering,
+            padded,
+            leaving,
+            axes,
+            origin: [o[x], o[y], o[z]],
+            shear,
+            shears: shear.map(|lanes| Column(lanes.to_array())),
+        };
+        Some((packet, t))
     }
 
     /// Bit `i` says that some ray may enter child `i` before `far`, and then not before `near[i]`.
     #[inline(always)]
     fn may_enter(&self, node: &Node, far: f32) -> (u32, [f32; WIDTH]) {
-        let (mut near, mut far) = (E::splat(0.0), E::splat(far * PADDING));
-        let padding = E::splat(PADDING);
+        let splat = <B::Eight as Lanes>::splat;
+        let plane = |k: usize| <B::Eight as Lanes>::load(&node.planes[k]);
+        let (mut near, mut far) = (splat(0.0), splat(far * PADDING));
+        let padding = splat(PADDING);
         for (axis, i) in self.intervals.iter().enumerate() {
             if i.first == Interval::<E>::BOTH {
                 // A box ahead is met by rays that go forwards, one behind by those that go backwards; how long they stay
                 // is anyone's guess.
-                let forwards = (E::load(&node.planes[2 * axis]) - i.ahead) * i.least;
-                let backwards = (E::load(&node.planes[2 * axis + 1]) - i.behind) * i.greatest;
+                let forwards = (plane(2 * axis) - i.ahead) * i.least;
+                let backwards = (plane(2 * axis + 1) - i.behind) * i.greatest;
                 near = forwards.max(backwards).max(near);
             } else {
-                let enters = E::load(&node.planes[i.first]) - i.ahead;
-                let leaves = (E::load(&node.planes[i.first ^ 1]) - i.behind) * padding;
+                let enters = plane(i.first) - i.ahead;
+                let leaves = (plane(i.first ^ 1) - i.behind) * padding;
                 near = (enters * i.least).min(enters * i.greatest).max(near);
                 far = (leaves * i.least).max(leaves * i.greatest).min(far);
             }
@@ -171,35 +212,37 @@ impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
 
     /// Bit `i` says that ray `i` enters child `slot` before `t[i]`.
     #[inline(always)]
-    fn enter(&self, node: &Node, slot: usize, t: &[[f32; GROUP]; GROUPS]) -> u32 {
-        let planes = |k: usize| (E::splat(node.planes[2 * k][slot]), E::splat(node.planes[2 * k + 1][slot]));
-        let (x, y, z) = (planes(0), planes(1), planes(2));
-        let padding = E::splat(PADDING);
-        let mut mask = 0;
-        for g in 0..self.n_groups() {
-            let Group { origin, inverse, .. } = &self.groups[g];
-            let slab = |(lo, hi): (E, E), k: usize| {
-                let (a, b) = ((lo - origin[k]) * inverse[k], (hi - origin[k]) * inverse[k]);
-                (a.min(b), a.max(b))
-            };
-            let (x, y, z) = (slab(x, 0), slab(y, 1), slab(z, 2));
-            let near = x.0.max(y.0).max(z.0.max(E::splat(0.0)));
-            let far = x.1.min(y.1).min(z.1.min(E::load(&t[g]))) * padding;
-            mask |= near.le(far).mask() << (GROUP * g);
+    fn enter(&self, node: &Node, slot: usize, t: &Column) -> u32 {
+        let plane = |k: usize| E::splat(node.planes[k][slot]);
+        let (mut near, mut far) = (E::splat(0.0), E::load(&t.0) * E::splat(PADDING));
+        for k in 0..3 {
+            let enters = |plane: E| plane.multiply_add(self.inverse[k], self.entering[k]);
+            let leaves = |plane: E| plane.multiply_add(self.padded[k], self.leaving[k]);
+            let first = self.intervals[k].first;
+            if first == Interval::<E>::BOTH {
+                let (lo, hi) = (plane(2 * k), plane(2 * k + 1));
+                near = enters(lo).min(enters(hi)).max(near);
+                far = leaves(lo).max(leaves(hi)).min(far);
+            } else {
+                near = enters(plane(first)).max(near);
+                far = leaves(plane(first ^ 1)).min(far);
+            }
         }
-        mask
+        near.le(far).mask()
     }
 
-    /// The hits of one triangle by a group.
+    /// The shear of a ray.
     #[inline(always)]
-    fn meet(
-        &self,
-        [x, y, z]: [usize; 3],
-        g: usize,
-        block: &Block,
-        lane: usize,
-        t: &[f32; GROUP],
-    ) -> Option<triangle::Candidates<E>> {
+    fn shear(&self, ray: usize) -> Shear {
+        let Some(axes) = self.axes else { return Shear::new(&self.rays[ray]) };
+        let o = &self.rays[ray].o;
+        let [x, y, z] = &self.shears;
+        Shear { axes, origin: [o[axes[0]], o[axes[1]], o[axes[2]]], shear: [x.0[ray], y.0[ray], z.0[ray]] }
+    }
+
+    /// The hits of one triangle.
+    #[inline(always)]
+    fn meet(&self, [x, y, z]: [usize; 3], block: &Block, lane: usize, t: &Column) -> Option<triangle::Candidates<E>> {
         let (a, b, c) = (block.corner(lane, 0), block.corner(lane, 1), block.corner(lane, 2));
         let [x_of, y_of, z_of] = [&block.vertices[x], &block.vertices[y], &block.vertices[z]];
         let along = [
@@ -207,11 +250,9 @@ impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
             [E::splat(x_of[b]), E::splat(y_of[b]), E::splat(z_of[b])],
             [E::splat(x_of[c]), E::splat(y_of[c]), E::splat(z_of[c])],
         ];
-        let Group { origin, shear, .. } = &self.groups[g];
-        let (mut found, strange) =
-            triangle::intersect_lanes(along, [origin[x], origin[y], origin[z]], *shear, E::load(t))?;
+        let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0))?;
         if strange != 0 {
-            again_in_double(&self.rays[GROUP * g..], &block.triangle(lane), t, strange, &mut found);
+            again_in_double(self.rays, &block.triangle(lane), t, strange, &mut found);
         }
         Some(found)
     }
@@ -219,39 +260,35 @@ impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
     /// Calls `hit` with ray, primitive and place for all that the rays of `active` meet in a leaf before `t`, which `hit`
     /// may shorten.
     #[inline(always)]
-    fn leaf<B: BoxTest>(
+    fn leaf(
         &self,
         bvh: &Bvh,
         leaf: Child,
         active: u32,
-        t: &mut [[f32; GROUP]; GROUPS],
+        t: &mut Column,
         mut hit: impl FnMut(usize, u32, Candidate) -> f32,
     ) {
         for index in leaf.index().. {
             let block = &bvh.blocks[index];
-            for g in 0..self.n_groups() {
-                let mine = active >> (GROUP * g) & E::ALL;
-                if mine.count_ones() > FEW_AT_LEAF
-                    && let Some(axes) = self.axes
-                {
-                    for lane in 0..block.count() {
-                        let Some(found) = self.meet(axes, g, block, lane, &t[g]) else { continue };
-                        each(found.mask & mine, |i| {
-                            let candidate = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
-                            t[g][i] = hit(GROUP * g + i, block.id(lane), candidate);
-                        });
-                    }
-                } else {
-                    each(mine, |i| {
-                        let ray = GROUP * g + i;
-                        let shear = Shear::new(&self.rays[ray]);
-                        let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, t[g][i]) else { return };
-                        each(found.mask, |lane| {
-                            let candidate = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
-                            t[g][i] = hit(ray, block.id(lane), candidate);
-                        });
+            if active.count_ones() > FEW_AT_LEAF
+                && let Some(axes) = self.axes
+            {
+                for lane in 0..block.count() {
+                    let Some(found) = self.meet(axes, block, lane, t) else { continue };
+                    each(found.mask & active, |i| {
+                        let candidate = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
+                        t.0[i] = hit(i, block.id(lane), candidate);
                     });
                 }
+            } else {
+                each(active, |ray| {
+                    let shear = self.shear(ray);
+                    let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, t.0[ray]) else { return };
+                    each(found.mask, |lane| {
+                        let candidate = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                        t.0[ray] = hit(ray, block.id(lane), candidate);
+                    });
+                });
             }
             if block.is_last() {
                 break;
@@ -262,38 +299,45 @@ impl<'a, E: Lanes<Array = [f32; GROUP]>> Packet<'a, E> {
 
 #[cold]
 #[inline(never)]
-fn again_in_double<E: Lanes<Array = [f32; GROUP]>>(
+fn again_in_double<E: Lanes<Array = [f32; PACKET]>>(
     rays: &[Ray],
     vertices: &[[f32; 3]; 3],
-    t: &[f32; GROUP],
+    t: &Column,
     strange: u32,
     found: &mut triangle::Candidates<E>,
 ) {
-    for (i, ray) in rays.iter().take(GROUP).enumerate().filter(|(i, _)| strange >> i & 1 != 0) {
-        if let Some(hit) = triangle::intersect(vertices, &Shear::new(ray)).filter(|hit| hit.t <= t[i]) {
+    for (i, ray) in rays.iter().take(PACKET).enumerate().filter(|(i, _)| strange >> i & 1 != 0) {
+        if let Some(hit) = triangle::intersect(vertices, &Shear::new(ray)).filter(|hit| hit.t <= t.0[i]) {
             found.mask |= 1 << i;
             (found.t[i], found.u[i], found.v[i]) = (hit.t, hit.u, hit.v);
         }
     }
 }
 
-/// Whether directions differ by at most [`SPREAD`] times the size of the first, along each axis.
+/// Whether the directions of the first ray, one in the middle and the last differ by at most [`SPREAD`] times the size of the
+/// first, along each axis: quick to say no.
 #[inline(always)]
-fn go_the_same_way(rays: &[Ray]) -> bool {
-    // The time rides along in the fourth lane, and is not looked at.
-    let lanes = |ray: &Ray| Native::load(&[ray.d[0], ray.d[1], ray.d[2], ray.time]);
+fn may_go_the_same_way(rays: &[Ray]) -> bool {
     let [x, y, z] = rays[0].d.map(f32::abs);
     let size = if x > y { x } else { y };
     let most = Native::splat(if size > z { size } else { z } * SPREAD);
-    let first = lanes(&rays[0]);
-    let (mut lo, mut hi) = (first, first);
-    rays.chunks(4).all(|few| {
-        for ray in few {
-            let d = lanes(ray);
-            (lo, hi) = (d.min(lo), d.max(hi));
-        }
-        (hi - lo).le(most).mask() & 7 == 7
-    })
+    // The time rides along in the fourth lane, and is not looked at.
+    let d = |i: usize| rays[i].lanes::<Native>().1;
+    let (first, middle, last) = (d(0), d(rays.len() / 2), d(rays.len() - 1));
+    ((first - last).abs().le(most) & (first - middle).abs().le(most)).mask() & 7 == 7
+}
+
+/// [`Shear::axes`] of all rays, if they are the same.
+#[inline(always)]
+fn same_axes<E: Lanes>(d: &[E; 3]) -> Option<[usize; 3]> {
+    let [x, y, z] = d.map(E::abs);
+    let (x_most, y_most) = ((y.lt(x) & z.lt(x)).mask(), z.lt(y).mask());
+    match (x_most, y_most) {
+        (all, _) if all == E::ALL => Some([1, 2, 0]),
+        (0, all) if all == E::ALL => Some([2, 0, 1]),
+        (0, 0) => Some([0, 1, 2]),
+        _ => None,
+    }
 }
 
 /// The stack of a packet: nearest on top.
@@ -350,30 +394,9 @@ fn gathered(mask: u32, ray: impl Fn(usize) -> Ray) -> ([Ray; PACKET], [usize; PA
     (rays, which, n)
 }
 
-/// Least and greatest.
-#[inline(always)]
-fn range(x: &[[f32; GROUP]]) -> (f32, f32) {
-    let (mut lo, mut hi) = (x[0][0], x[0][0]);
-    for &x in x.as_flattened() {
-        lo = if x < lo { x } else { lo };
-        hi = if x > hi { x } else { hi };
-    }
-    (lo, hi)
-}
-
-/// Ends of rays; that of no ray is before all beginnings.
-#[inline(always)]
-fn ends(rays: &[Ray]) -> [[f32; GROUP]; GROUPS] {
-    let mut t = [[f32::NEG_INFINITY; GROUP]; GROUPS];
-    for (t, ray) in t.as_flattened_mut().iter_mut().zip(rays) {
-        *t = ray.t_max;
-    }
-    t
-}
-
 /// As [`walk::closest`] for each of up to [`PACKET`] rays.
 #[inline(always)]
-pub(super) fn closest<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
+pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
     rays: &[Ray],
     leaves: &L,
@@ -382,10 +405,9 @@ pub(super) fn closest<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
     if bvh.nodes.is_empty() || rays.len() <= FEW as usize {
         return false;
     }
-    let Some(packet) = Packet::<E>::new(rays) else { return false };
-    let mut t = ends(rays);
-    let mut best: [Best<L::UserHit>; PACKET] = std::array::from_fn(|i| Best::new(t[i / GROUP][i % GROUP]));
-    let mut far = range(&t).1;
+    let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
+    let mut best: [Best<L::UserHit>; PACKET] = std::array::from_fn(|i| Best::new(t.0[i]));
+    let mut far = t.greatest();
     let mut waiting = Waiting { stack: Stack::new(), n: 0 };
     let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
     waiting.push(bvh, 0, mask, &near);
@@ -405,7 +427,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
             }
             each(active, |i| {
                 walk::closest_below::<B, L>(bvh, entry.child, &rays[i], leaves, &mut best[i]);
-                t[i / GROUP][i % GROUP] = best[i].t;
+                t.0[i] = best[i].t;
             });
         } else if entry.child.is_users() {
             for index in entry.child.index().. {
@@ -415,19 +437,19 @@ pub(super) fn closest<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
                 leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
                 for (&i, hit) in which[..n].iter().zip(hits) {
                     best[i].offer_user_hit(user & !LAST_USER, hit);
-                    t[i / GROUP][i % GROUP] = best[i].t;
+                    t.0[i] = best[i].t;
                 }
                 if user & LAST_USER != 0 {
                     break;
                 }
             }
         } else {
-            packet.leaf::<B>(bvh, entry.child, active, &mut t, |i, id, at| {
+            packet.leaf(bvh, entry.child, active, &mut t, |i, id, at| {
                 best[i].offer_triangle(leaves, &rays[i], id, at.t, at.u, at.v);
                 best[i].t
             });
         }
-        far = range(&t).1;
+        far = t.greatest();
     }
     for (out, best) in out.iter_mut().zip(best) {
         *out = best.finish();
@@ -437,7 +459,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
 
 /// As [`walk::any`] for each of up to [`PACKET`] rays.
 #[inline(always)]
-pub(super) fn any<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
+pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
     rays: &[Ray],
     leaves: &L,
@@ -446,10 +468,9 @@ pub(super) fn any<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
     if bvh.nodes.is_empty() || rays.len() <= FEW as usize {
         return false;
     }
-    let Some(packet) = Packet::<E>::new(rays) else { return false };
     // Rays that have met something end before they begin.
-    let mut t = ends(rays);
-    let mut far = range(&t).1;
+    let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
+    let mut far = t.greatest();
     let mut waiting = Waiting { stack: Stack::new(), n: 0 };
     out.fill(false);
     let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
@@ -483,7 +504,7 @@ pub(super) fn any<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
                 }
             }
         } else {
-            packet.leaf::<B>(bvh, entry.child, active, &mut t, |i, id, at| {
+            packet.leaf(bvh, entry.child, active, &mut t, |i, id, at| {
                 let is_hit = at.t < rays[i].t_max && counts(leaves, &rays[i], id, at);
                 blocked |= u32::from(is_hit) << i;
                 if is_hit || blocked >> i & 1 != 0 { f32::NEG_INFINITY } else { rays[i].t_max }
@@ -492,9 +513,9 @@ pub(super) fn any<E: Lanes<Array = [f32; GROUP]>, B: BoxTest, L: Leaves>(
         if blocked != 0 {
             each(blocked, |i| {
                 out[i] = true;
-                t[i / GROUP][i % GROUP] = f32::NEG_INFINITY;
+                t.0[i] = f32::NEG_INFINITY;
             });
-            far = range(&t).1;
+            far = t.greatest();
             if far == f32::NEG_INFINITY {
                 break;
             }
