@@ -413,6 +413,24 @@ impl Materials {
         false
     }
 
+    /// The reflectance of a material that is diffuse and the same everywhere, without relief, and what it makes of it.
+    #[inline]
+    pub fn plain_diffuse(
+        &self,
+        id: MaterialId,
+        textures: &Textures,
+        at: &TextureContext,
+        lambda: &Wavelengths,
+    ) -> Option<SampledSpectrum> {
+        let entry = self.entries.get(id.0 as usize)?;
+        match entry.material {
+            Material::Diffuse { reflectance } if !entry.is_textured && !self.force_diffuse => {
+                Some(textures.spectrum(reflectance, at, lambda).clamp(0.0, 1.0))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether a material looks anything up in textures, so that it needs to know how large a pixel is where it is met.
     #[inline]
     pub fn is_textured(&self, id: MaterialId) -> bool {
