@@ -3,7 +3,7 @@
 use super::accel::NO_EMITTER;
 use super::triangle::{normal_and_length, triangle_point};
 use super::{Geometry, Hit, Level, NO_INSTANCE};
-use crate::interaction::{LightId, MaterialId};
+use crate::interaction::{Interaction, LightId, MaterialId, ReferencePoint};
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
 use irradiant_math::{Frame, Point2, Vec3};
 
@@ -28,12 +28,16 @@ pub struct SurfaceLanes {
     pub p: Triples,
     /// Bounds of their errors.
     pub p_error: Triples,
-    /// Normals, geometric and shading.
+    /// Geometric normals, unit.
     pub n: Triples,
+    /// Shading normals, unit.
+    pub ns: Triples,
     /// First tangents of the shading frames.
     pub x: Triples,
     /// Second ones.
     pub y: Triples,
+    /// Their normal directions.
+    pub z: Triples,
 }
 
 impl SurfaceLanes {
@@ -43,14 +47,39 @@ impl SurfaceLanes {
         p: Triples::ZERO,
         p_error: Triples::ZERO,
         n: Triples::ZERO,
+        ns: Triples::ZERO,
         x: Triples::ZERO,
         y: Triples::ZERO,
+        z: Triples::ZERO,
     };
+
+    /// A lane as lights see it.
+    #[inline(always)]
+    pub fn reference(&self, i: usize) -> ReferencePoint {
+        ReferencePoint {
+            p: self.p.point(i),
+            p_error: self.p_error.vector(i),
+            n: self.n.normal(i),
+            ns: self.ns.normal(i),
+        }
+    }
+
+    /// Sets a lane to a surface that was found alone, and its shading frame.
+    pub fn set(&mut self, i: usize, at: &Interaction, frame: &Frame) {
+        self.wo.set(i, at.wo.to_array());
+        self.p.set(i, at.p.to_array());
+        self.p_error.set(i, at.p_error.to_array());
+        self.n.set(i, at.n.to_array());
+        self.ns.set(i, at.ns.to_array());
+        self.x.set(i, frame.x.to_array());
+        self.y.set(i, frame.y.to_array());
+        self.z.set(i, frame.z.to_array());
+    }
 
     /// The shading frame of a lane.
     #[inline(always)]
     pub fn frame(&self, i: usize) -> Frame {
-        Frame { x: self.x.vector(i), y: self.y.vector(i), z: self.n.vector(i) }
+        Frame { x: self.x.vector(i), y: self.y.vector(i), z: self.z.vector(i) }
     }
 }
 
@@ -84,6 +113,8 @@ impl TriangleLanes {
             out.p.set(i, p.to_array());
             out.p_error.set(i, p_error.to_array());
             out.n.set(i, z.to_array());
+            out.ns.set(i, z.to_array());
+            out.z.set(i, z.to_array());
             out.x.set(i, frame.x.to_array());
             out.y.set(i, frame.y.to_array());
         }

@@ -431,6 +431,23 @@ impl Materials {
         }
     }
 
+    /// How light scatters in the shading frame of a hit, of a material without textures, relief or choices; `None` for others.
+    #[inline]
+    pub fn plain_bsdf(
+        &self,
+        id: MaterialId,
+        frame: Frame,
+        textures: &Textures,
+        at: &TextureContext,
+        lambda: &mut Wavelengths,
+    ) -> Option<Bsdf> {
+        let entry = self.entries.get(id.0 as usize)?;
+        if entry.is_textured || self.force_diffuse {
+            return None;
+        }
+        self.framed(frame, &entry.material, textures, at, lambda)
+    }
+
     /// Whether a material looks anything up in textures, so that it needs to know how large a pixel is where it is met.
     #[inline]
     pub fn is_textured(&self, id: MaterialId) -> bool {

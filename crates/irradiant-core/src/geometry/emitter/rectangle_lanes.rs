@@ -122,7 +122,7 @@ impl RectangleLanes {
             let e = at.p_error.vector(i) + self.p_error.vector(i);
             let is_on_plane = seen.height() <= e.x + e.y + e.z;
             let w =
-                RectangleEmitter::weights_at(p, at.n.normal(i), corner, self.ex.vector(i), self.ey.vector(i), &seen);
+                RectangleEmitter::weights_at(p, at.ns.normal(i), corner, self.ex.vector(i), self.ey.vector(i), &seen);
             let warped = bilinear(Point2::new(u[0][i], u[1][i]), w);
             let pdf = bilinear_pdf(warped, w) / seen.solid_angle();
             let [a, b] = seen.sample_along(warped);
