@@ -5,7 +5,7 @@
 //! vectors of the processor ([`Kernel`]): random numbers, surfaces, points of lamps, scattered directions. Between them, path by path: rays,
 //! spectra, roulette.
 //!
-//! Only what is common is computed in lanes: flat triangles, diffuse scattering, rectangular lamps. For the rest each vertex is asked alone,
+//! Only what is common is computed in lanes: flat triangles, diffuse surfaces and rough metals, rectangular lamps. For the rest each vertex is asked alone,
 //! by the functions that [`PathIntegrator::follow`] calls, and its answers are put into the lanes. That loop stays the specification.
 
 use crate::camera_samples::CameraSample;
@@ -14,15 +14,16 @@ use crate::light_samples::direct_light;
 use crate::path::{PathIntegrator, Previous, Roulette, Walk, power_heuristic, survival_probability};
 use crate::record::NoRecord;
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::{Bxdf, Diffuse, Sides, TransportMode, is_usable};
+use irradiant_core::bxdf::conductor::{MirrorLobe, mirror_lobe};
+use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode, is_usable};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::geometry::{EmitterShape, Hit, Kernel, RectangleLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, ReferencePoint, TextureContext};
-use irradiant_core::light::{AreaAlpha, AreaRadiance, Light, PixelLine, SampleMode};
-use irradiant_core::light_sampler::LightSampler;
+use irradiant_core::light::{AreaAlpha, AreaRadiance, Light, PixelLine, PixelRun, SampleMode, TargetLanes};
+use irradiant_core::light_sampler::{LightSampler, PickedLight};
 use irradiant_core::sampler::{BlockLanes, SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
-use irradiant_math::lanes::{Floats, LANES, Triples, whole};
+use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE, whole};
 use irradiant_math::warp::cosine_hemisphere;
 use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
@@ -33,6 +34,8 @@ use std::f32::consts::FRAC_1_PI;
 enum Scattering {
     /// Diffusely, by the reflectance of its lane.
     Diffuse,
+    /// As a rough metal, that of its lane.
+    Metal,
     /// By a model of its own: its place among those of the batch.
     Alone(u32),
     /// Not here: the path has been taken to its end.
@@ -72,6 +75,11 @@ pub(crate) struct Batch {
     at: SurfaceLanes,
     scattering: [Scattering; LANES],
     reflectance: [SampledSpectrum; LANES],
+    metals: [Conductor; LANES],
+    is_metal: [u32; LANES],
+    alphas: [Floats; 2],
+    /// Of the last directions asked for: cosine with the facet, value, density.
+    lobes: [Floats; 3],
     bsdfs: Vec<Bsdf>,
     light: BlockLanes,
     scatter: BlockLanes,
@@ -81,16 +89,23 @@ pub(crate) struct Batch {
     /// The lamp that each lane holds.
     lamp: [u32; LANES],
     two_sided: [u32; LANES],
+    targets: TargetLanes,
+    is_delta: [u32; LANES],
     arriving: [SampledSpectrum; LANES],
-    /// The chance with which the lamp was picked; 0 where none is sampled.
+    /// The chance with which the light was picked; 0 where none is sampled.
     pmf: Floats,
-    /// Of diffuse surfaces the cosine where it is scattered, and the weight of the sample over its density.
+    /// The cosine where it is scattered, and the weight of the sample over its density.
     light_cosine: Floats,
     light_factor: Floats,
-    /// Paths whose light samples are taken alone.
-    light_alone: Vec<(u32, Option<PixelLine>)>,
+    /// Paths whose light samples are drawn alone, and their way to the sky.
+    light_alone: Vec<(u32, PickedLight, Option<PixelLine>)>,
+    light_runs: Vec<Option<PixelRun>>,
+    shadow_rays: Vec<Ray>,
+    shadow_ends: Vec<f32>,
+    /// The sample that each would bring this to.
+    shadow_light: Vec<(u32, SampledSpectrum)>,
 
-    // Directions of diffuse surfaces.
+    // Directions of diffuse surfaces and metals.
     next_o: Triples,
     next_d: Triples,
     next_pdf: Floats,
@@ -120,17 +135,27 @@ impl Batch {
             at: SurfaceLanes::ZERO,
             scattering: [Scattering::Gone; LANES],
             reflectance: [SampledSpectrum::ZERO; LANES],
-            bsdfs: Vec::with_capacity(LANES),
+            metals: [Conductor::new(SampledSpectrum::ONE, SampledSpectrum::ONE, Ggx::SMOOTH); LANES],
+            is_metal: [0; LANES],
+            alphas: [[1.0; LANES]; 2],
+            lobes: [[0.0; LANES]; 3],
+            bsdfs: Vec::new(),
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
             lamps: RectangleLanes::NONE,
             lamp: [NO_LAMP; LANES],
             two_sided: [0; LANES],
+            targets: TargetLanes::NONE,
+            is_delta: [0; LANES],
             arriving: [SampledSpectrum::ZERO; LANES],
             pmf: [0.0; LANES],
             light_cosine: [0.0; LANES],
             light_factor: [0.0; LANES],
-            light_alone: Vec::with_capacity(LANES),
+            light_alone: Vec::new(),
+            light_runs: Vec::new(),
+            shadow_rays: Vec::new(),
+            shadow_ends: Vec::new(),
+            shadow_light: Vec::new(),
             next_o: Triples::ZERO,
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
@@ -183,6 +208,50 @@ impl Batch {
         self.sample[to] = self.sample[from];
     }
 
+    /// The weight of a lane's light sample over its density, where scattering finds its direction with the density `pdf`.
+    #[inline(always)]
+    fn light_weight(&self, i: usize, pdf: f32) -> f32 {
+        let light_pdf = self.pmf[i] * self.targets.pdf[i];
+        let weight = power_heuristic(light_pdf, pdf);
+        (if self.is_delta[i] != 0 { 1.0 } else { weight }) / light_pdf
+    }
+
+    /// Whether any of the lanes of a vector is one of metal.
+    #[inline(always)]
+    fn has_metal(&self, first: usize) -> bool {
+        self.is_metal[first..first + WHOLE].iter().fold(0, |any, metal| any | metal) != 0
+    }
+
+    #[inline(always)]
+    fn set_lobe(&mut self, i: usize, lobe: &MirrorLobe) {
+        (self.lobes[0][i], self.lobes[1][i], self.lobes[2][i]) = (lobe.cos, lobe.value, lobe.pdf);
+    }
+
+    /// What a lane's metal scatters in the direction last asked for, without cosine.
+    #[inline]
+    fn metal_f(&self, i: usize) -> SampledSpectrum {
+        self.metals[i].fresnel(self.lobes[0][i]) * self.lobes[1][i]
+    }
+
+    /// Makes a lane's surface scatter so.
+    #[inline(always)]
+    fn set_metal(&mut self, i: usize, metal: Conductor) {
+        let [x, y] = metal.facets().alphas();
+        (self.metals[i], self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (metal, 1, x, y);
+        self.scattering[i] = Scattering::Metal;
+    }
+
+    #[inline(always)]
+    fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
+        self.reflectance[i] = reflectance;
+        self.scattering[i] = Scattering::Diffuse;
+    }
+
+    fn set_alone(&mut self, i: usize, bsdf: Bsdf) {
+        self.scattering[i] = Scattering::Alone(self.bsdfs.len() as u32);
+        self.bsdfs.push(bsdf);
+    }
+
     /// All that lights look at.
     fn interaction(&self, i: usize) -> Interaction {
         let n: Normal3 = self.at.n.normal(i);
@@ -222,7 +291,7 @@ impl Kernel for Numbers<'_> {
     }
 }
 
-/// Points of lamps, and how much of their light diffuse surfaces scatter along the path.
+/// Points of rectangular lamps.
 struct SampleLamps<'a>(&'a mut Batch, usize);
 
 impl Kernel for SampleLamps<'_> {
@@ -231,22 +300,52 @@ impl Kernel for SampleLamps<'_> {
     fn run(self) {
         let Self(b, n) = self;
         let [u, v, ..] = &b.light.0;
-        b.lamps.sample(n, &b.at, [u, v], &b.two_sided);
+        b.lamps.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+    }
+}
+
+/// How much of the light samples is scattered along the path, but for models of their own; the rays that ask for what is in the way.
+struct Weigh<'a>(&'a mut Batch, usize);
+
+impl Kernel for Weigh<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        b.targets.aim(n, &b.at);
         for i in whole(n) {
             let frame = b.at.frame(i);
-            let wi = b.lamps.wi.vector(i);
+            let wi = b.targets.wi.vector(i);
             let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
             let pdf = local_i.z.abs() * FRAC_1_PI;
             let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
-            let light_pdf = b.pmf[i] * b.lamps.pdf[i];
             let cosine = wi.dot(frame.z).abs();
-            b.light_factor[i] = power_heuristic(light_pdf, pdf) / light_pdf;
+            b.light_factor[i] = b.light_weight(i, pdf);
             b.light_cosine[i] = if scatters { cosine } else { 0.0 };
+        }
+        for first in whole(n).step_by(WHOLE) {
+            if !b.has_metal(first) {
+                continue;
+            }
+            for i in first..first + WHOLE {
+                let frame = b.at.frame(i);
+                let wi = b.targets.wi.vector(i);
+                let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
+                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
+                let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
+                let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+                b.set_lobe(i, &lobe);
+                let is_metal = b.is_metal[i] != 0;
+                let cosine = if scatters { wi.dot(frame.z).abs() } else { 0.0 };
+                let factor = b.light_weight(i, lobe.pdf);
+                b.light_factor[i] = if is_metal { factor } else { b.light_factor[i] };
+                b.light_cosine[i] = if is_metal { cosine } else { b.light_cosine[i] };
+            }
         }
     }
 }
 
-/// Directions that diffuse surfaces scatter to, and the rays that go there.
+/// Directions that diffuse surfaces and metals scatter to, and the rays that go there.
 struct Scatter<'a>(&'a mut Batch, usize);
 
 impl Kernel for Scatter<'_> {
@@ -263,11 +362,42 @@ impl Kernel for Scatter<'_> {
             let is_good = is_usable(wo) & (pdf > 0.0) & (pdf < f32::INFINITY) & is_usable(local);
             let wi = frame.from_local(local);
             let factor = wi.dot(frame.z).abs() / pdf;
-            let o: Point3 = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
             b.next_d.set(i, wi.to_array());
-            b.next_o.set(i, o.to_array());
             b.next_pdf[i] = pdf;
             b.next_factor[i] = if is_good { factor } else { -1.0 };
+        }
+        for first in whole(n).step_by(WHOLE) {
+            if !b.has_metal(first) {
+                continue;
+            }
+            for i in first..first + WHOLE {
+                let frame = b.at.frame(i);
+                let wo = frame.to_local(b.at.wo.vector(i));
+                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
+                let (local, is_above) = facets.bounded_reflection(wo, b.scatter.uv(i));
+                let (lobe, is_lit) = mirror_lobe(&facets, wo, local);
+                let is_good = is_usable(wo)
+                    & is_above
+                    & is_lit
+                    & (lobe.pdf > 0.0)
+                    & (lobe.pdf < f32::INFINITY)
+                    & is_usable(local);
+                b.set_lobe(i, &lobe);
+                let wi = frame.from_local(local);
+                let factor = wi.dot(frame.z).abs() / lobe.pdf;
+                let factor = if is_good { factor } else { -1.0 };
+                let is_metal = b.is_metal[i] != 0;
+                let choose = |a: f32, b: f32| if is_metal { a } else { b };
+                let other = b.next_d.vector(i);
+                b.next_d.set(i, [choose(wi.x, other.x), choose(wi.y, other.y), choose(wi.z, other.z)]);
+                b.next_pdf[i] = choose(lobe.pdf, b.next_pdf[i]);
+                b.next_factor[i] = choose(factor, b.next_factor[i]);
+            }
+        }
+        for i in whole(n) {
+            let wi = b.next_d.vector(i);
+            let o: Point3 = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
+            b.next_o.set(i, o.to_array());
         }
     }
 }
@@ -370,27 +500,31 @@ impl PathIntegrator {
         b.bsdfs.clear();
         for i in 0..n {
             let s = b.sample[i] as usize;
+            b.is_metal[i] = 0;
             if let Surface::Flat(material, light) = b.surface[i] {
-                let (lambda, mut after) = (&samples[s].lambda, samples[s].lambda);
-                let diffuse = scene.materials.plain_diffuse(material, &scene.textures, &nowhere, lambda);
-                let scattering = if let Some(reflectance) = diffuse {
-                    b.reflectance[i] = reflectance;
-                    Some(Scattering::Diffuse)
+                let lambda = samples[s].lambda;
+                let mut after = lambda;
+                let (materials, textures) = (&scene.materials, &scene.textures);
+                let is_known = if let Some(reflectance) = materials.plain_diffuse(material, textures, &nowhere, &lambda)
+                {
+                    b.set_diffuse(i, reflectance);
+                    true
+                } else if let Some(metal) = materials.plain_rough_metal(material, textures, &nowhere, &lambda) {
+                    b.set_metal(i, metal);
+                    true
+                } else if let Some(bsdf) = materials.plain_bsdf(material, b.at.frame(i), textures, &nowhere, &mut after)
+                {
+                    b.set_alone(i, bsdf);
+                    true
                 } else {
-                    let frame = b.at.frame(i);
-                    let bsdf = scene.materials.plain_bsdf(material, frame, &scene.textures, &nowhere, &mut after);
-                    bsdf.map(|bsdf| {
-                        b.bsdfs.push(bsdf);
-                        Scattering::Alone(b.bsdfs.len() as u32 - 1)
-                    })
+                    false
                 };
-                if let Some(scattering) = scattering {
-                    b.scattering[i] = scattering;
+                if is_known {
                     if light.is_some() {
                         let at = Interaction { light, uv: b.triangles.uv(i), ..b.interaction(i) };
-                        radiance[s] += self.emitted(scene, &b.walk(i, depth), &at, lambda, &mut NoRecord);
+                        radiance[s] += self.emitted(scene, &b.walk(i, depth), &at, &lambda, &mut NoRecord);
                     }
-                    if diffuse.is_none() {
+                    if matches!(b.scattering[i], Scattering::Alone(_)) {
                         samples[s].lambda = after;
                     }
                     continue;
@@ -430,13 +564,11 @@ impl PathIntegrator {
         }
         sample.lambda = after;
         b.at.set(i, &at, &bsdf.frame);
-        b.scattering[i] = if let Bxdf::Diffuse(diffuse) = &bsdf.bxdf {
-            b.reflectance[i] = diffuse.reflectance;
-            Scattering::Diffuse
-        } else {
-            b.bsdfs.push(bsdf);
-            Scattering::Alone(b.bsdfs.len() as u32 - 1)
-        };
+        match bsdf.bxdf {
+            Bxdf::Diffuse(diffuse) => b.set_diffuse(i, diffuse.reflectance),
+            Bxdf::Conductor(metal) if !metal.facets().is_smooth() => b.set_metal(i, metal),
+            _ => b.set_alone(i, bsdf),
+        }
     }
 
     #[inline(never)]
@@ -465,7 +597,9 @@ impl PathIntegrator {
         stats: &mut RenderStats,
     ) {
         let only = match &scene.light_sampler {
-            LightSampler::Uniform(_) if scene.lights.as_slice().len() == 1 => Some((LightId(0), 1.0)),
+            LightSampler::Uniform(_) if scene.lights.as_slice().len() == 1 => {
+                Some(PickedLight { id: LightId(0), pmf: 1.0 })
+            }
             _ => None,
         };
         let (sky, mode) = (scene.lights.sky(), SampleMode::Compensated);
@@ -475,6 +609,7 @@ impl PathIntegrator {
             b.pmf[i] = 0.0;
             let scatters = match b.scattering[i] {
                 Scattering::Diffuse => !b.reflectance[i].is_black(),
+                Scattering::Metal => true,
                 Scattering::Alone(k) => b.bsdfs[k as usize].flags().is_non_specular(),
                 Scattering::Gone => false,
             };
@@ -482,10 +617,9 @@ impl PathIntegrator {
                 continue;
             }
             let draws = b.light.light_draws(i);
-            let picked = only.or_else(|| {
-                scene.light_sampler.sample(&b.at.reference(i), draws.pick).map(|picked| (picked.id, picked.pmf))
-            });
-            let Some((id, pmf)) = picked else { continue };
+            let picked = only.or_else(|| scene.light_sampler.sample(&b.at.reference(i), draws.pick));
+            let Some(picked) = picked else { continue };
+            let PickedLight { id, pmf } = picked;
             if let Light::Area(lamp) = scene.lights.get(id)
                 && let (EmitterShape::Rectangle(rectangle), AreaRadiance::Uniform(emission), AreaAlpha::Constant(alpha)) =
                     (&lamp.shape, &lamp.radiance, lamp.alpha)
@@ -495,48 +629,83 @@ impl PathIntegrator {
                     (b.lamp[i], b.two_sided[i]) = (id.0, u32::from(lamp.two_sided));
                 }
                 b.arriving[i] = emission.sample(&samples[b.sample[i] as usize].lambda) * lamp.scale * alpha;
-                b.pmf[i] = pmf;
+                (b.pmf[i], b.is_delta[i]) = (pmf, 0);
                 any = true;
             } else {
                 let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(draws.uv, mode));
-                b.light_alone.push((i as u32, line));
+                b.light_alone.push((i as u32, picked, line));
             }
         }
+        let level = scene.geometry.level();
         if any {
-            scene.geometry.level().run(SampleLamps(b, n));
-            self.light_of_lamps(b, n, scene, radiance, stats);
+            level.run(SampleLamps(b, n));
         }
-        let runs = |line: &Option<PixelLine>| line.zip(sky).map(|(line, (_, sky))| sky.approach(line, mode));
-        let prepared: Vec<_> = b.light_alone.iter().map(|(_, line)| runs(line)).collect();
-        for (&(i, _), run) in b.light_alone.iter().zip(prepared) {
+        // The way to a point of the sky is waiting for memory: each step for all.
+        let approach = |line: Option<PixelLine>| line.zip(sky).map(|(line, (_, sky))| sky.approach(line, mode));
+        b.light_runs.clear();
+        b.light_runs.extend(b.light_alone.iter().map(|&(.., line)| approach(line)));
+        let may_pass = scene.materials.may_pass();
+        for j in 0..b.light_alone.len() {
+            let ((i, picked, _), run) = (b.light_alone[j], b.light_runs[j]);
             let i = i as usize;
             let s = b.sample[i] as usize;
-            let diffuse = || Bsdf::new(b.at.frame(i), Bxdf::Diffuse(Diffuse::new(b.reflectance[i])));
-            let made;
-            let bsdf = if let Scattering::Alone(k) = b.scattering[i] {
-                &b.bsdfs[k as usize]
-            } else {
-                made = diffuse();
-                &made
+            let lambda = &samples[s].lambda;
+            let light = scene.lights.get(picked.id);
+            if may_pass && light.is_delta() {
+                radiance[s] += self.light_alone(b, i, depth, scene, lambda, stats);
+                continue;
+            }
+            let sample = match (run, sky) {
+                (Some(run), Some((_, sky))) => sky.arrive(run, lambda, mode),
+                _ => light.sample(&b.at.reference(i), b.light.uv(i), lambda, mode),
             };
-            radiance[s] += direct_light(
-                scene,
-                &b.interaction(i),
-                bsdf,
-                &b.throughput[i],
-                &samples[s].lambda,
-                &b.light.light_draws(i),
-                run,
-                1,
-                depth,
-                stats,
-                &mut NoRecord,
-            );
+            let Some(sample) = sample else { continue };
+            b.arriving[i] = sample.radiance * scene.opacity(&sample);
+            b.targets.set(i, &sample);
+            (b.pmf[i], b.is_delta[i]) = (picked.pmf, u32::from(sample.is_delta));
+            any = true;
+        }
+        if any {
+            level.run(Weigh(b, n));
+            self.arriving_light(b, n, scene, radiance, stats);
         }
     }
 
-    /// What sampled points of rectangular lamps bring, unless something is in the way.
-    fn light_of_lamps(
+    /// A light sample of one path.
+    #[cold]
+    fn light_alone(
+        &self,
+        b: &Batch,
+        i: usize,
+        depth: u32,
+        scene: &Scene,
+        lambda: &Wavelengths,
+        stats: &mut RenderStats,
+    ) -> SampledSpectrum {
+        let bsdf = match b.scattering[i] {
+            Scattering::Alone(k) => b.bsdfs[k as usize],
+            Scattering::Metal => Bsdf::new(b.at.frame(i), Bxdf::Conductor(b.metals[i])),
+            Scattering::Diffuse | Scattering::Gone => {
+                Bsdf::new(b.at.frame(i), Bxdf::Diffuse(Diffuse::new(b.reflectance[i])))
+            }
+        };
+        direct_light(
+            scene,
+            &b.interaction(i),
+            &bsdf,
+            &b.throughput[i],
+            lambda,
+            &b.light.light_draws(i),
+            None,
+            1,
+            depth,
+            stats,
+            &mut NoRecord,
+        )
+    }
+
+    /// What light samples bring, unless something is in the way.
+    fn arriving_light(
         &self,
         b: &mut Batch,
         n: usize,
@@ -544,31 +713,41 @@ impl PathIntegrator {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        let alpha = scene.alpha();
+        b.shadow_rays.clear();
+        b.shadow_ends.clear();
+        b.shadow_light.clear();
         for i in 0..n {
-            if !(b.pmf[i] > 0.0 && b.lamps.pdf[i] > 0.0) {
+            if !(b.pmf[i] > 0.0 && b.targets.pdf[i] > 0.0) {
                 continue;
             }
             let (f, factor) = match b.scattering[i] {
+                Scattering::Diffuse => (b.reflectance[i] * FRAC_1_PI, b.light_factor[i]),
+                Scattering::Metal => (b.metal_f(i), b.light_factor[i]),
                 Scattering::Alone(k) => {
-                    let (bsdf, wi) = (&b.bsdfs[k as usize], b.lamps.wi.vector(i));
+                    let (bsdf, wi) = (&b.bsdfs[k as usize], b.targets.wi.vector(i));
                     let (f, pdf) = bsdf.f_and_pdf(b.at.wo.vector(i), wi, TransportMode::Radiance);
-                    let light_pdf = b.pmf[i] * b.lamps.pdf[i];
-                    (f * wi.dot(bsdf.frame.z).abs(), power_heuristic(light_pdf, pdf) / light_pdf)
+                    b.light_cosine[i] = wi.dot(bsdf.frame.z).abs();
+                    (f, b.light_weight(i, pdf))
                 }
-                Scattering::Diffuse | Scattering::Gone => {
-                    (b.reflectance[i] * FRAC_1_PI * b.light_cosine[i], b.light_factor[i])
-                }
+                Scattering::Gone => continue,
             };
-            if f.is_black() || b.arriving[i].is_black() {
+            let f = f * b.light_cosine[i];
+            if f.is_black() || b.arriving[i].is_black() || !f.is_finite() {
                 continue;
             }
-            stats.shadow_rays += 1;
-            let segment = Ray::new(b.lamps.segment_o.point(i), b.lamps.segment_d.vector(i), b.time[i]);
-            if scene.geometry.occluded_between(&segment, &alpha) {
-                continue;
+            let (ray, end) = b.targets.ray(i, b.time[i]);
+            b.shadow_rays.push(ray);
+            b.shadow_ends.push(end);
+            b.shadow_light.push((b.sample[i], b.throughput[i] * f * b.arriving[i] * factor));
+        }
+        stats.shadow_rays += b.shadow_rays.len() as u64;
+        let mut occluded = [false; LANES];
+        let occluded = &mut occluded[..b.shadow_rays.len()];
+        scene.geometry.occluded_batch(&b.shadow_rays, &b.shadow_ends, &scene.alpha(), occluded);
+        for (&(s, light), occluded) in b.shadow_light.iter().zip(occluded) {
+            if !*occluded {
+                radiance[s as usize] += light;
             }
-            radiance[b.sample[i] as usize] += b.throughput[i] * f * b.arriving[i] * factor;
         }
     }
 
@@ -585,6 +764,17 @@ impl PathIntegrator {
                 Scattering::Diffuse => {
                     let f = b.reflectance[i] * FRAC_1_PI;
                     if f.is_black() || b.next_factor[i] < 0.0 {
+                        continue;
+                    }
+                    throughput *= f * b.next_factor[i];
+                    (wi, o, bsdf_pdf) = (b.next_d.vector(i), b.next_o.point(i), b.next_pdf[i]);
+                }
+                Scattering::Metal => {
+                    if b.next_factor[i] < 0.0 {
+                        continue;
+                    }
+                    let f = b.metal_f(i);
+                    if f.is_black() || !f.is_finite() {
                         continue;
                     }
                     throughput *= f * b.next_factor[i];

@@ -36,6 +36,7 @@ pub use compile::compile_geometry;
 pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample};
 
 pub use irradiant_bvh::{Kernel, Level};
+pub(crate) use spawn::segment;
 pub use triangle_lanes::{SurfaceLanes, TriangleLanes};
 
 use crate::interaction::{Interaction, LightId, MaterialId, ShapeId, TextureContext};

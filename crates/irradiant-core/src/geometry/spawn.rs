@@ -35,7 +35,7 @@ impl ReferencePoint {
 
 /// Origin and direction of a segment between two points with their errors and normals.
 #[inline(always)]
-pub(super) fn segment(from: (Point3, Vec3, Normal3), to: (Point3, Vec3, Normal3)) -> (Point3, Vec3) {
+pub(crate) fn segment(from: (Point3, Vec3, Normal3), to: (Point3, Vec3, Normal3)) -> (Point3, Vec3) {
     let (p, p_error, n) = to;
     let o = offset_ray_origin(from.0, from.1, from.2, p - from.0);
     let back = o - p;

@@ -431,6 +431,27 @@ impl Materials {
         }
     }
 
+    /// A metal that is rough and the same everywhere, without relief.
+    #[inline]
+    pub fn plain_rough_metal(
+        &self,
+        id: MaterialId,
+        textures: &Textures,
+        at: &TextureContext,
+        lambda: &Wavelengths,
+    ) -> Option<Conductor> {
+        let entry = self.entries.get(id.0 as usize)?;
+        match &entry.material {
+            Material::Conductor { metal, facets: Facets::Constant(facets) }
+                if !entry.is_textured && !self.force_diffuse && !facets.is_smooth() =>
+            {
+                let (eta, k) = metal.at(textures, at, lambda);
+                Some(Conductor::new(eta, k, *facets))
+            }
+            _ => None,
+        }
+    }
+
     /// How light scatters in the shading frame of a hit, of a material without textures, relief or choices; `None` for others.
     #[inline]
     pub fn plain_bsdf(

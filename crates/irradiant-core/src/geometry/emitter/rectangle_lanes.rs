@@ -2,7 +2,7 @@
 
 use super::RectangleEmitter;
 use crate::geometry::SurfaceLanes;
-use crate::geometry::spawn::segment;
+use crate::light::TargetLanes;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE, whole};
 use irradiant_math::warp::{SphericalRectangle, bilinear, bilinear_pdf};
 use irradiant_math::{Point2, Point3};
@@ -24,16 +24,9 @@ pub struct RectangleLanes {
     // Between the steps.
     s: Floats,
     t: Floats,
+    pdf: Floats,
     by_area: [u32; LANES],
     is_near: [u32; LANES],
-    /// Directions to the points, unit.
-    pub wi: Triples,
-    /// Their densities, 1/sr; 0 where there is nothing to draw.
-    pub pdf: Floats,
-    /// Where segments from the surfaces to the points begin.
-    pub segment_o: Triples,
-    /// Where they lead, in one unit of their parameter.
-    pub segment_d: Triples,
 }
 
 impl RectangleLanes {
@@ -53,10 +46,7 @@ impl RectangleLanes {
         t: [0.0; LANES],
         by_area: [0; LANES],
         is_near: [0; LANES],
-        wi: Triples::ZERO,
         pdf: [0.0; LANES],
-        segment_o: Triples::ZERO,
-        segment_d: Triples::ZERO,
     };
 
     /// Puts a rectangle into a lane.
@@ -72,10 +62,16 @@ impl RectangleLanes {
         self.p_error.set(i, r.p_error.to_array());
     }
 
-    /// For `n` lanes what [`AreaLight::sample`](crate::light::AreaLight::sample) draws from lamps that shine on the side of their normals,
-    /// to the bit, with the segments to ask for what is in the way.
+    /// For `n` lanes what [`AreaLight::sample`](crate::light::AreaLight::sample) draws, to the bit: into `out`.
     #[inline(always)]
-    pub fn sample(&mut self, n: usize, at: &SurfaceLanes, u: [&Floats; 2], two_sided: &[u32; LANES]) {
+    pub fn sample(
+        &mut self,
+        n: usize,
+        at: &SurfaceLanes,
+        u: [&Floats; 2],
+        two_sided: &[u32; LANES],
+        out: &mut TargetLanes,
+    ) {
         for i in whole(n) {
             let is_far = (at.p.point(i) - self.center.point(i)).length_squared() > self.limit[i];
             (self.s[i], self.t[i], self.pdf[i]) = (u[0][i], u[1][i], self.per_area[i]);
@@ -101,12 +97,12 @@ impl RectangleLanes {
             let wi = to * (1.0 / d2.sqrt());
             let usable = (!is_by_area || (d2 > 0.0 && cos > 0.0)) & (pdf > 0.0) & (pdf < f32::INFINITY) & (d2 > 0.0);
             let shines = (two_sided[i] != 0) | !(normal.dot(wi) > 0.0);
-            self.wi.set(i, wi.to_array());
-            self.pdf[i] = if usable & shines { pdf } else { 0.0 };
-            let (o, d) =
-                segment((reference, at.p_error.vector(i), at.n.normal(i)), (p, self.p_error.vector(i), normal));
-            self.segment_o.set(i, o.to_array());
-            self.segment_d.set(i, d.to_array());
+            out.wi.set(i, wi.to_array());
+            out.pdf[i] = if usable & shines { pdf } else { 0.0 };
+            out.p.set(i, p.to_array());
+            out.p_error.set(i, self.p_error.vector(i).to_array());
+            out.n.set(i, normal.to_array());
+            out.is_infinite[i] = 0;
         }
     }
 
