@@ -6,8 +6,8 @@
 use crate::vector::{Normal3, Point3, Vec3};
 
 /// How many there are at once: enough to share the cost of a stage, few enough that all numbers of all stages stay in the second-level
-/// cache.
-pub const LANES: usize = 256;
+/// cache. Not a power of two, or the arrays of a lane's numbers would compete for the same places of the first-level cache.
+pub const LANES: usize = 240;
 
 /// Loops run over a multiple of so many lanes, the last ones for nothing: a vector's worth, so that none is left over.
 pub const WHOLE: usize = 16;

@@ -148,9 +148,10 @@ pub(crate) fn for_each_batch(
         scene.geometry.intersect_batch(&rays, &ends, &scene.alpha(), hits);
         seen.fill(SampledSpectrum::ZERO);
         radiance(samples, hits, seen, stats);
-        for (sample, seen) in samples.drain(..).zip(seen) {
-            add_sample(scene, &sample, tile, &mut layers, stats, |_, _, _, _, _| *seen);
+        for (sample, seen) in samples.iter().zip(seen) {
+            add_sample(scene, sample, tile, &mut layers, stats, |_, _, _, _, _| *seen);
         }
+        samples.clear();
     };
     for_each_place(unit, |pixel, index| {
         samples.push(camera_sample(scene, pixel, index));

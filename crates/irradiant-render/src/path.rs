@@ -65,7 +65,7 @@ impl Default for PathIntegrator {
 impl Integrator for PathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
         if self.has_stages(scene) {
-            let mut batch = Batch::new();
+            let mut batch = Batch::new(scene);
             for_each_batch(scene, unit, tile, stats, |samples, hits, radiance, stats| {
                 self.radiance_of_batch(&mut batch, scene, samples, hits, radiance, stats);
             });

@@ -7,400 +7,34 @@
 //!
 //! Only what is common is computed in lanes: flat triangles, diffuse surfaces and rough metals, rectangular lamps. For the rest each vertex is asked alone,
 //! by the functions that [`PathIntegrator::follow`] calls, and its answers are put into the lanes. That loop stays the specification.
+//!
+//! In reading order: this file (the walk), `batch` (what paths carry), `kernels` (the stages in lanes).
+
+mod batch;
+mod kernels;
+
+pub(crate) use batch::Batch;
 
 use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::direct_light;
-use crate::path::{PathIntegrator, Previous, Roulette, Walk, power_heuristic, survival_probability};
+use crate::path::{PathIntegrator, Roulette, Walk, survival_probability};
 use crate::record::NoRecord;
+use batch::{Plain, Scattering, Surface, nowhere};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::conductor::{MirrorLobe, mirror_lobe};
-use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode, is_usable};
+use irradiant_core::bxdf::{Bxdf, Diffuse, Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
-use irradiant_core::geometry::{EmitterShape, Hit, Kernel, RectangleLanes, SurfaceLanes, TriangleLanes};
-use irradiant_core::interaction::{Interaction, LightId, MaterialId, ReferencePoint, TextureContext};
-use irradiant_core::light::{AreaAlpha, AreaRadiance, Light, PixelLine, PixelRun, SampleMode, TargetLanes};
+use irradiant_core::geometry::{EmitterShape, Hit};
+use irradiant_core::interaction::{Interaction, LightId};
+use irradiant_core::light::{AreaAlpha, AreaRadiance, Light, PixelLine, SampleMode};
 use irradiant_core::light_sampler::{LightSampler, PickedLight};
-use irradiant_core::sampler::{BlockLanes, SampleStream, StreamLanes};
+use irradiant_core::sampler::{SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
-use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE, whole};
-use irradiant_math::warp::cosine_hemisphere;
-use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use irradiant_math::lanes::LANES;
+use irradiant_math::{Ray, offset_ray_origin};
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
+use kernels::{Numbers, SampleLamps, Scatter, Surfaces, Weigh};
 use std::f32::consts::FRAC_1_PI;
-
-/// How a path's vertex scatters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scattering {
-    /// Diffusely, by the reflectance of its lane.
-    Diffuse,
-    /// As a rough metal, that of its lane.
-    Metal,
-    /// By a model of its own: its place among those of the batch.
-    Alone(u32),
-    /// Not here: the path has been taken to its end.
-    Gone,
-}
-
-/// What a path meets.
-#[derive(Clone, Copy, Debug)]
-enum Surface {
-    /// A flat triangle of this material, perhaps a lamp.
-    Flat(MaterialId, Option<LightId>),
-    /// Something else.
-    Other,
-}
-
-/// What the paths of a batch carry, side by side.
-#[repr(C, align(64))]
-pub(crate) struct Batch {
-    // Between vertices.
-    o: Triples,
-    d: Triples,
-    time: Floats,
-    streams: StreamLanes,
-    previous: [Triples; 4],
-    bsdf_pdf: Floats,
-    specular: [bool; LANES],
-    throughput: [SampledSpectrum; LANES],
-    roulette_scale: Floats,
-    met: [Option<Hit>; LANES],
-    escape_place: [Option<Point2>; LANES],
-    /// Which of the batch's samples.
-    sample: [u32; LANES],
-
-    // At a vertex.
-    surface: [Surface; LANES],
-    triangles: TriangleLanes,
-    at: SurfaceLanes,
-    scattering: [Scattering; LANES],
-    reflectance: [SampledSpectrum; LANES],
-    metals: [Conductor; LANES],
-    is_metal: [u32; LANES],
-    alphas: [Floats; 2],
-    /// Of the last directions asked for: cosine with the facet, value, density.
-    lobes: [Floats; 3],
-    bsdfs: Vec<Bsdf>,
-    light: BlockLanes,
-    scatter: BlockLanes,
-
-    // Light samples.
-    lamps: RectangleLanes,
-    /// The lamp that each lane holds.
-    lamp: [u32; LANES],
-    two_sided: [u32; LANES],
-    targets: TargetLanes,
-    is_delta: [u32; LANES],
-    arriving: [SampledSpectrum; LANES],
-    /// The chance with which the light was picked; 0 where none is sampled.
-    pmf: Floats,
-    /// The cosine where it is scattered, and the weight of the sample over its density.
-    light_cosine: Floats,
-    light_factor: Floats,
-    /// Paths whose light samples are drawn alone, and their way to the sky.
-    light_alone: Vec<(u32, PickedLight, Option<PixelLine>)>,
-    light_runs: Vec<Option<PixelRun>>,
-    shadow_rays: Vec<Ray>,
-    shadow_ends: Vec<f32>,
-    /// The sample that each would bring this to.
-    shadow_light: Vec<(u32, SampledSpectrum)>,
-
-    // Directions of diffuse surfaces and metals.
-    next_o: Triples,
-    next_d: Triples,
-    next_pdf: Floats,
-    /// cos / pdf; negative where nothing is scattered.
-    next_factor: Floats,
-}
-
-const NO_LAMP: u32 = u32::MAX;
-
-impl Batch {
-    pub fn new() -> Box<Self> {
-        Box::new(Self {
-            o: Triples::ZERO,
-            d: Triples::ZERO,
-            time: [0.0; LANES],
-            streams: StreamLanes::NONE,
-            previous: [Triples::ZERO; 4],
-            bsdf_pdf: [0.0; LANES],
-            specular: [false; LANES],
-            throughput: [SampledSpectrum::ZERO; LANES],
-            roulette_scale: [0.0; LANES],
-            met: [None; LANES],
-            escape_place: [None; LANES],
-            sample: [0; LANES],
-            surface: [Surface::Other; LANES],
-            triangles: TriangleLanes::NONE,
-            at: SurfaceLanes::ZERO,
-            scattering: [Scattering::Gone; LANES],
-            reflectance: [SampledSpectrum::ZERO; LANES],
-            metals: [Conductor::new(SampledSpectrum::ONE, SampledSpectrum::ONE, Ggx::SMOOTH); LANES],
-            is_metal: [0; LANES],
-            alphas: [[1.0; LANES]; 2],
-            lobes: [[0.0; LANES]; 3],
-            bsdfs: Vec::new(),
-            light: BlockLanes::ZERO,
-            scatter: BlockLanes::ZERO,
-            lamps: RectangleLanes::NONE,
-            lamp: [NO_LAMP; LANES],
-            two_sided: [0; LANES],
-            targets: TargetLanes::NONE,
-            is_delta: [0; LANES],
-            arriving: [SampledSpectrum::ZERO; LANES],
-            pmf: [0.0; LANES],
-            light_cosine: [0.0; LANES],
-            light_factor: [0.0; LANES],
-            light_alone: Vec::new(),
-            light_runs: Vec::new(),
-            shadow_rays: Vec::new(),
-            shadow_ends: Vec::new(),
-            shadow_light: Vec::new(),
-            next_o: Triples::ZERO,
-            next_d: Triples::ZERO,
-            next_pdf: [0.0; LANES],
-            next_factor: [0.0; LANES],
-        })
-    }
-
-    #[inline(always)]
-    fn ray(&self, i: usize) -> Ray {
-        Ray::new(self.o.point(i), self.d.vector(i), self.time[i])
-    }
-
-    /// A path on its way to what it meets.
-    fn walk(&self, i: usize, depth: u32) -> Walk {
-        let previous = (depth > 0).then(|| {
-            let [p, p_error, n, ns] = &self.previous;
-            let reference =
-                ReferencePoint { p: p.point(i), p_error: p_error.vector(i), n: n.normal(i), ns: ns.normal(i) };
-            Previous { reference, bsdf_pdf: self.bsdf_pdf[i], specular: self.specular[i], light_splits: 1 }
-        });
-        Walk {
-            throughput: self.throughput[i],
-            depth,
-            roulette_scale: self.roulette_scale[i],
-            previous,
-            // Only regularisation asks, which has no stages.
-            any_non_specular: depth > 0,
-            escape_place: self.escape_place[i],
-            ..Walk::from_camera(self.ray(i), self.met[i])
-        }
-    }
-
-    /// What a path carries goes from lane `from` to lane `to`.
-    #[inline(always)]
-    fn shift(&mut self, to: usize, from: usize) {
-        if to == from {
-            return;
-        }
-        self.o.shift(to, from);
-        self.d.shift(to, from);
-        self.time[to] = self.time[from];
-        self.streams.shift(to, from);
-        self.previous.iter_mut().for_each(|t| t.shift(to, from));
-        self.bsdf_pdf[to] = self.bsdf_pdf[from];
-        self.specular[to] = self.specular[from];
-        self.throughput[to] = self.throughput[from];
-        self.roulette_scale[to] = self.roulette_scale[from];
-        self.met[to] = self.met[from];
-        self.escape_place[to] = self.escape_place[from];
-        self.sample[to] = self.sample[from];
-    }
-
-    /// The weight of a lane's light sample over its density, where scattering finds its direction with the density `pdf`.
-    #[inline(always)]
-    fn light_weight(&self, i: usize, pdf: f32) -> f32 {
-        let light_pdf = self.pmf[i] * self.targets.pdf[i];
-        let weight = power_heuristic(light_pdf, pdf);
-        (if self.is_delta[i] != 0 { 1.0 } else { weight }) / light_pdf
-    }
-
-    /// Whether any of the lanes of a vector is one of metal.
-    #[inline(always)]
-    fn has_metal(&self, first: usize) -> bool {
-        self.is_metal[first..first + WHOLE].iter().fold(0, |any, metal| any | metal) != 0
-    }
-
-    #[inline(always)]
-    fn set_lobe(&mut self, i: usize, lobe: &MirrorLobe) {
-        (self.lobes[0][i], self.lobes[1][i], self.lobes[2][i]) = (lobe.cos, lobe.value, lobe.pdf);
-    }
-
-    /// What a lane's metal scatters in the direction last asked for, without cosine.
-    #[inline]
-    fn metal_f(&self, i: usize) -> SampledSpectrum {
-        self.metals[i].fresnel(self.lobes[0][i]) * self.lobes[1][i]
-    }
-
-    /// Makes a lane's surface scatter so.
-    #[inline(always)]
-    fn set_metal(&mut self, i: usize, metal: Conductor) {
-        let [x, y] = metal.facets().alphas();
-        (self.metals[i], self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (metal, 1, x, y);
-        self.scattering[i] = Scattering::Metal;
-    }
-
-    #[inline(always)]
-    fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
-        self.reflectance[i] = reflectance;
-        self.scattering[i] = Scattering::Diffuse;
-    }
-
-    fn set_alone(&mut self, i: usize, bsdf: Bsdf) {
-        self.scattering[i] = Scattering::Alone(self.bsdfs.len() as u32);
-        self.bsdfs.push(bsdf);
-    }
-
-    /// All that lights look at.
-    fn interaction(&self, i: usize) -> Interaction {
-        let n: Normal3 = self.at.n.normal(i);
-        Interaction {
-            p: self.at.p.point(i),
-            p_error: self.at.p_error.vector(i),
-            n,
-            ns: self.at.ns.normal(i),
-            wo: self.at.wo.vector(i),
-            ..Interaction::unknown(&self.ray(i), 0.0)
-        }
-    }
-}
-
-/// Flat surfaces.
-struct Surfaces<'a>(&'a mut Batch, usize);
-
-impl Kernel for Surfaces<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let Self(b, n) = self;
-        b.triangles.surfaces(n, &b.d, &mut b.at);
-    }
-}
-
-/// The random numbers of a vertex.
-struct Numbers<'a>(&'a mut Batch, usize, u32);
-
-impl Kernel for Numbers<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let Self(b, n, depth) = self;
-        b.streams.light(n, depth, &mut b.light);
-        b.streams.scatter(n, depth, &mut b.scatter);
-    }
-}
-
-/// Points of rectangular lamps.
-struct SampleLamps<'a>(&'a mut Batch, usize);
-
-impl Kernel for SampleLamps<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let Self(b, n) = self;
-        let [u, v, ..] = &b.light.0;
-        b.lamps.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
-    }
-}
-
-/// How much of the light samples is scattered along the path, but for models of their own; the rays that ask for what is in the way.
-struct Weigh<'a>(&'a mut Batch, usize);
-
-impl Kernel for Weigh<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let Self(b, n) = self;
-        b.targets.aim(n, &b.at);
-        for i in whole(n) {
-            let frame = b.at.frame(i);
-            let wi = b.targets.wi.vector(i);
-            let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
-            let pdf = local_i.z.abs() * FRAC_1_PI;
-            let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
-            let cosine = wi.dot(frame.z).abs();
-            b.light_factor[i] = b.light_weight(i, pdf);
-            b.light_cosine[i] = if scatters { cosine } else { 0.0 };
-        }
-        for first in whole(n).step_by(WHOLE) {
-            if !b.has_metal(first) {
-                continue;
-            }
-            for i in first..first + WHOLE {
-                let frame = b.at.frame(i);
-                let wi = b.targets.wi.vector(i);
-                let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
-                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
-                let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
-                let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
-                b.set_lobe(i, &lobe);
-                let is_metal = b.is_metal[i] != 0;
-                let cosine = if scatters { wi.dot(frame.z).abs() } else { 0.0 };
-                let factor = b.light_weight(i, lobe.pdf);
-                b.light_factor[i] = if is_metal { factor } else { b.light_factor[i] };
-                b.light_cosine[i] = if is_metal { cosine } else { b.light_cosine[i] };
-            }
-        }
-    }
-}
-
-/// Directions that diffuse surfaces and metals scatter to, and the rays that go there.
-struct Scatter<'a>(&'a mut Batch, usize);
-
-impl Kernel for Scatter<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        let Self(b, n) = self;
-        for i in whole(n) {
-            let frame = b.at.frame(i);
-            let wo = frame.to_local(b.at.wo.vector(i));
-            let drawn = cosine_hemisphere(b.scatter.uv(i));
-            let pdf = drawn.z * FRAC_1_PI;
-            let local = Vec3::new(drawn.x, drawn.y, drawn.z.copysign(wo.z));
-            let is_good = is_usable(wo) & (pdf > 0.0) & (pdf < f32::INFINITY) & is_usable(local);
-            let wi = frame.from_local(local);
-            let factor = wi.dot(frame.z).abs() / pdf;
-            b.next_d.set(i, wi.to_array());
-            b.next_pdf[i] = pdf;
-            b.next_factor[i] = if is_good { factor } else { -1.0 };
-        }
-        for first in whole(n).step_by(WHOLE) {
-            if !b.has_metal(first) {
-                continue;
-            }
-            for i in first..first + WHOLE {
-                let frame = b.at.frame(i);
-                let wo = frame.to_local(b.at.wo.vector(i));
-                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
-                let (local, is_above) = facets.bounded_reflection(wo, b.scatter.uv(i));
-                let (lobe, is_lit) = mirror_lobe(&facets, wo, local);
-                let is_good = is_usable(wo)
-                    & is_above
-                    & is_lit
-                    & (lobe.pdf > 0.0)
-                    & (lobe.pdf < f32::INFINITY)
-                    & is_usable(local);
-                b.set_lobe(i, &lobe);
-                let wi = frame.from_local(local);
-                let factor = wi.dot(frame.z).abs() / lobe.pdf;
-                let factor = if is_good { factor } else { -1.0 };
-                let is_metal = b.is_metal[i] != 0;
-                let choose = |a: f32, b: f32| if is_metal { a } else { b };
-                let other = b.next_d.vector(i);
-                b.next_d.set(i, [choose(wi.x, other.x), choose(wi.y, other.y), choose(wi.z, other.z)]);
-                b.next_pdf[i] = choose(lobe.pdf, b.next_pdf[i]);
-                b.next_factor[i] = choose(factor, b.next_factor[i]);
-            }
-        }
-        for i in whole(n) {
-            let wi = b.next_d.vector(i);
-            let o: Point3 = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
-            b.next_o.set(i, o.to_array());
-        }
-    }
-}
 
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
@@ -495,8 +129,6 @@ impl PathIntegrator {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        // Nothing varies over plain materials, so that any place will do.
-        let nowhere = TextureContext::without_footprint(Point3::ZERO, Normal3::ZERO, Point2::ZERO, 0);
         b.bsdfs.clear();
         for i in 0..n {
             let s = b.sample[i] as usize;
@@ -504,20 +136,26 @@ impl PathIntegrator {
             if let Surface::Flat(material, light) = b.surface[i] {
                 let lambda = samples[s].lambda;
                 let mut after = lambda;
-                let (materials, textures) = (&scene.materials, &scene.textures);
-                let is_known = if let Some(reflectance) = materials.plain_diffuse(material, textures, &nowhere, &lambda)
-                {
-                    b.set_diffuse(i, reflectance);
-                    true
-                } else if let Some(metal) = materials.plain_rough_metal(material, textures, &nowhere, &lambda) {
-                    b.set_metal(i, metal);
-                    true
-                } else if let Some(bsdf) = materials.plain_bsdf(material, b.at.frame(i), textures, &nowhere, &mut after)
-                {
-                    b.set_alone(i, bsdf);
-                    true
-                } else {
-                    false
+                let plain = match b.known.get_mut(material.0 as usize) {
+                    Some(known) if lambda.basis == Basis::Rgb => {
+                        *known.get_or_insert_with(|| Plain::of(scene, material, &lambda))
+                    }
+                    _ => Plain::of(scene, material, &lambda),
+                };
+                let is_known = match plain {
+                    Plain::Diffuse(reflectance) => {
+                        b.set_diffuse(i, reflectance);
+                        true
+                    }
+                    Plain::Metal(metal) => {
+                        b.set_metal(i, metal);
+                        true
+                    }
+                    Plain::Other => {
+                        let frame = b.at.frame(i);
+                        let bsdf = scene.materials.plain_bsdf(material, frame, &scene.textures, &nowhere(), &mut after);
+                        bsdf.map(|bsdf| b.set_alone(i, bsdf)).is_some()
+                    }
                 };
                 if is_known {
                     if light.is_some() {
