@@ -35,7 +35,7 @@ mod triangle;
 mod validate;
 
 pub use build::{BuildInput, BuildReport, BuildSettings, Mesh};
-pub use level::Level;
+pub use level::{Kernel, Level};
 pub use node::Bvh;
 pub use pages::vec_on_large_pages;
 pub use prefetch::prefetch_read;

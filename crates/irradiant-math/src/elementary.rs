@@ -62,6 +62,14 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     }
 }
 
+/// [`sin_cos`] of |x| below 4e7, without asking: for loops that become vector code.
+#[inline(always)]
+pub fn sin_cos_bounded(x: f32) -> (f32, f32) {
+    debug_assert!(!(x.abs() >= TRIG_LIMIT));
+    let (s, c) = sin_cos_core(x as f64);
+    (if x == 0.0 { x } else { s as f32 }, c as f32)
+}
+
 /// Sine and cosine of `x` in [-pi/4, pi/4] (about), where nothing need be reduced: `f32` series, error 1 ulp of 1.
 #[inline(always)]
 pub(crate) fn sin_cos_octant(x: f32) -> (f32, f32) {

@@ -15,7 +15,7 @@ pub struct Frame {
 
 impl Frame {
     /// Some frame around the unit vector `z`.
-    #[inline]
+    #[inline(always)]
     pub fn from_z(z: Vec3) -> Self {
         // Duff et al. 2017, JCGT 6(1): branchless basis. copysign, so that z.z = -0 is treated like z.z < 0.
         let sign = 1f32.copysign(z.z);
@@ -30,7 +30,7 @@ impl Frame {
 
     /// The frame with normal `z` (unit) and first tangent as near as possible to `x` (need be neither unit nor
     /// orthogonal). Falls back to [`Frame::from_z`] when `x` is parallel to `z` or not finite.
-    #[inline]
+    #[inline(always)]
     pub fn from_z_near_x(z: Vec3, x: Vec3) -> Self {
         let tangent = x - z * z.dot(x);
         let length_squared = tangent.length_squared();
@@ -42,13 +42,13 @@ impl Frame {
     }
 
     /// Components of `v` in this frame.
-    #[inline]
+    #[inline(always)]
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         Vec3::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
     }
 
     /// The vector whose components in this frame are `v`.
-    #[inline]
+    #[inline(always)]
     pub fn from_local(&self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }

@@ -181,7 +181,7 @@ impl Div for Interval {
 ///
 /// `p_error` bounds the absolute error of each coordinate of `p`; `n` is the geometric normal (either side, unit). The
 /// exact surface then lies strictly behind the returned point as seen along `w`. Wächter 2008; Pharr et al. 2023, 6.8.6.
-#[inline]
+#[inline(always)]
 pub fn offset_ray_origin(p: Point3, p_error: Vec3, n: Normal3, w: Vec3) -> Point3 {
     // Towards w, without a branch: which side is a coin toss to the processor.
     let distance = n.abs().dot(p_error).copysign(w.dot_normal(n));

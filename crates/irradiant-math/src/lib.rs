@@ -4,7 +4,8 @@
 //! In the order a newcomer should read: [`vector`] (the distinct types), [`ray`], [`bounds`], [`frame`], [`transform`] (in
 //! `f64`, for building), [`affine`] (in `f32`, for rays), [`motion`] (keyframes); [`elementary`] (functions with pinned bits),
 //! [`hash`], [`interval`] (rounding errors and ray origins), [`solve`]; [`warp`] (unit square to anything),
-//! [`distribution`] (tables), [`sequence`] (Sobol, Halton, Owen), [`noise`](mod@noise). Nothing here knows of light or of files.
+//! [`distribution`] (tables), [`sequence`] (Sobol, Halton, Owen), [`noise`](mod@noise); [`lanes`] (the
+//! numbers of many paths side by side). Nothing here knows of light or of files.
 #![forbid(unsafe_code)]
 // `!(x > 0.0)` is how this house says "not positive, or NaN".
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -16,6 +17,7 @@ pub mod elementary;
 pub mod frame;
 pub mod hash;
 pub mod interval;
+pub mod lanes;
 pub mod motion;
 pub mod noise;
 pub mod ray;

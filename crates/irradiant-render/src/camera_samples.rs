@@ -7,6 +7,7 @@ use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
 use irradiant_core::sampler::{CameraDraws, SampleStream};
 use irradiant_core::scene::Scene;
+use irradiant_math::lanes::LANES;
 use irradiant_math::{Point2, Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
@@ -106,15 +107,7 @@ pub fn for_each_first_hit<A, B>(
     let mut sought: Vec<A> = Vec::with_capacity(TOGETHER);
     let mut approached: Vec<B> = Vec::with_capacity(TOGETHER);
     let mut take = |samples: &mut Vec<CameraSample>| {
-        // Where the camera sees nothing, a ray without length stands in.
-        rays.clear();
-        ends.clear();
-        for sample in samples.iter() {
-            let nothing = || (Ray::new(Point3::ZERO, Vec3::Z, 0.0), 0.0);
-            let (ray, end) = sample.camera_ray.map_or_else(nothing, |camera_ray| (camera_ray.ray, f32::INFINITY));
-            rays.push(ray);
-            ends.push(end);
-        }
+        gather(samples, &mut rays, &mut ends);
         let hits = &mut hits[..rays.len()];
         scene.geometry.intersect_batch(&rays, &ends, &scene.alpha(), hits);
         sought.extend(samples.iter().zip(hits.iter()).map(|(sample, hit)| seek(sample, *hit)));
@@ -132,6 +125,53 @@ pub fn for_each_first_hit<A, B>(
         }
     });
     take(&mut samples);
+}
+
+/// As [`for_each_first_hit`], of estimators that take many samples at once: [`LANES`] at most. `radiance` is told the samples, their
+/// first hits, and where to put what they see, which is zero so far.
+pub(crate) fn for_each_batch(
+    scene: &Scene,
+    unit: &WorkUnit,
+    tile: &mut FilmTile,
+    stats: &mut RenderStats,
+    mut radiance: impl FnMut(&mut [CameraSample], &[Option<Hit>], &mut [SampledSpectrum], &mut RenderStats),
+) {
+    let mut layers = vec![0f32; scene.layers.channels()];
+    let mut samples: Vec<CameraSample> = Vec::with_capacity(LANES);
+    let mut rays: Vec<Ray> = Vec::with_capacity(LANES);
+    let mut ends: Vec<f32> = Vec::with_capacity(LANES);
+    let mut hits = [None; LANES];
+    let mut seen = [SampledSpectrum::ZERO; LANES];
+    let mut take = |samples: &mut Vec<CameraSample>| {
+        gather(samples, &mut rays, &mut ends);
+        let (hits, seen) = (&mut hits[..rays.len()], &mut seen[..rays.len()]);
+        scene.geometry.intersect_batch(&rays, &ends, &scene.alpha(), hits);
+        seen.fill(SampledSpectrum::ZERO);
+        radiance(samples, hits, seen, stats);
+        for (sample, seen) in samples.iter().zip(seen) {
+            add_sample(scene, sample, tile, &mut layers, stats, |_, _, _, _, _| *seen);
+        }
+        samples.clear();
+    };
+    for_each_place(unit, |pixel, index| {
+        samples.push(camera_sample(scene, pixel, index));
+        if samples.len() == LANES {
+            take(&mut samples);
+        }
+    });
+    take(&mut samples);
+}
+
+/// The camera rays of samples and how far they go. Where the camera sees nothing, a ray without length stands in.
+fn gather(samples: &[CameraSample], rays: &mut Vec<Ray>, ends: &mut Vec<f32>) {
+    rays.clear();
+    ends.clear();
+    for sample in samples {
+        let nothing = || (Ray::new(Point3::ZERO, Vec3::Z, 0.0), 0.0);
+        let (ray, end) = sample.camera_ray.map_or_else(nothing, |camera_ray| (camera_ray.ray, f32::INFINITY));
+        rays.push(ray);
+        ends.push(end);
+    }
 }
 
 /// Each sample of each pixel, neighbours one after another.

@@ -30,6 +30,7 @@ pub mod self_intersection;
 pub mod session;
 pub mod shared_path;
 pub mod simple_path;
+mod staged_path;
 pub mod truncation;
 
 pub use integrator::{Integrator, Limit, RenderStats, SceneHas, WorkUnit};

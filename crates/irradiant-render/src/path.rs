@@ -5,11 +5,12 @@
 //! share one set of decisions whose densities do not depend on wavelength, so that no wavelength weighting is needed;
 //! a dispersive vertex ends the secondary ones.
 
-use crate::camera_samples::{CameraSample, for_each_first_hit};
+use crate::camera_samples::{CameraSample, for_each_batch, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
 use crate::light_samples::{MOST_SPLITS, check_splits, direct_light, samples_of};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
+use crate::staged_path::Batch;
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{BsdfSample, Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
@@ -63,6 +64,13 @@ impl Default for PathIntegrator {
 
 impl Integrator for PathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
+        if self.has_stages(scene) {
+            let mut batch = Batch::new(scene);
+            for_each_batch(scene, unit, tile, stats, |samples, hits, radiance, stats| {
+                self.radiance_of_batch(&mut batch, scene, samples, hits, radiance, stats);
+            });
+            return;
+        }
         // Under a sky, the first lookups of many paths are prepared together, since they wait for memory; in vain where
         // another light is picked.
         let sky = scene.lights.sky().map(|(_, sky)| sky);
@@ -519,7 +527,7 @@ impl PathIntegrator {
 
 /// Veach's power heuristic (beta = 2) for one sample of each of two techniques: the weight of the one with density `a`.
 /// Densities whose squares overflow count as infinite.
-#[inline]
+#[inline(always)]
 pub fn power_heuristic(a: f32, b: f32) -> f32 {
     let (a, b) = (a * a, b * b);
     if a.is_infinite() {

@@ -24,17 +24,34 @@ pub(super) fn mirror_f_and_pdf(
     wi: Vec3,
     fresnel: impl FnOnce(f32) -> SampledSpectrum,
 ) -> (SampledSpectrum, f32) {
-    if wo.z * wi.z <= 0.0 || facets.is_smooth() {
+    if facets.is_smooth() {
         return (SampledSpectrum::ZERO, 0.0);
     }
+    match mirror_lobe(facets, wo, wi) {
+        (lobe, true) => (fresnel(lobe.cos) * lobe.value, lobe.pdf),
+        (_, false) => (SampledSpectrum::ZERO, 0.0),
+    }
+}
+
+/// A rough mirror lobe without Fresnel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MirrorLobe {
+    /// Cosine with the facet.
+    pub cos: f32,
+    /// To be multiplied with the facet's reflectance, 1/sr.
+    pub value: f32,
+    /// 1/sr.
+    pub pdf: f32,
+}
+
+/// The lobe of facets that are not smooth, and whether these directions are on one side, where it is of use.
+#[inline(always)]
+pub fn mirror_lobe(facets: &Ggx, wo: Vec3, wi: Vec3) -> (MirrorLobe, bool) {
     let h = wo + wi;
     let length_squared = h.length_squared();
-    if length_squared == 0.0 {
-        return (SampledSpectrum::ZERO, 0.0);
-    }
     let m = h / length_squared.sqrt();
-    let f = fresnel(wo.dot(m).abs()) * facets.reflection(wo, wi, m);
-    (f, facets.bounded_pdf(wo, m))
+    let lobe = MirrorLobe { cos: wo.dot(m).abs(), value: facets.reflection(wo, wi, m), pdf: facets.bounded_pdf(wo, m) };
+    (lobe, !(wo.z * wi.z <= 0.0) & (length_squared != 0.0))
 }
 
 /// A sample of [`mirror_f_and_pdf`]; a delta in the mirror direction when smooth.
@@ -64,6 +81,12 @@ impl Conductor {
     #[inline]
     pub fn new(eta: SampledSpectrum, k: SampledSpectrum, facets: Ggx) -> Self {
         Self { eta, k, facets }
+    }
+
+    /// Its facets.
+    #[inline]
+    pub fn facets(&self) -> Ggx {
+        self.facets
     }
 
     /// The fraction reflected by a facet at this angle, per lane.

@@ -8,7 +8,7 @@
 //! Eto and Tokuyoshi 2023, "Bounded VNDF sampling for Smith-GGX reflections". Figures for smoothness and
 //! regularisation are pbrt-v4's.
 
-use irradiant_math::elementary::sin_cos;
+use irradiant_math::elementary::sin_cos_bounded;
 use irradiant_math::{Point2, Vec3};
 use std::f32::consts::PI;
 
@@ -48,7 +48,7 @@ impl Ggx {
     }
 
     /// Whether the facets are treated as one mirror: both alphas below 1e-3.
-    #[inline]
+    #[inline(always)]
     pub fn is_smooth(&self) -> bool {
         self.alpha_x.max(self.alpha_y) < 1e-3
     }
@@ -70,7 +70,7 @@ impl Ggx {
     }
 
     /// The density of facet normals, per steradian, times the cosine integrating to 1.
-    #[inline]
+    #[inline(always)]
     pub fn d(&self, m: Vec3) -> f32 {
         // x^2 + y^2 rather than 1 - z^2: keeps its digits for alphas of 1e-3. Scaled by the alphas to divide once.
         let product = self.alpha_x * self.alpha_y;
@@ -80,7 +80,7 @@ impl Ggx {
     }
 
     /// The length of `w` stretched by the alphas, `sqrt(ax^2 x^2 + ay^2 y^2 + z^2)`; Smith's Lambda is `(s/|z| - 1)/2`.
-    #[inline]
+    #[inline(always)]
     pub fn stretch(&self, w: Vec3) -> f32 {
         let (x, y) = (self.alpha_x * w.x, self.alpha_y * w.y);
         (x * x + y * y + w.z * w.z).sqrt()
@@ -102,7 +102,7 @@ impl Ggx {
     }
 
     /// D G2 / (4 cos cos): the reflection lobe without Fresnel, for a half vector `m`.
-    #[inline]
+    #[inline(always)]
     pub fn reflection(&self, wo: Vec3, wi: Vec3, m: Vec3) -> f32 {
         let (co, ci) = (wo.z.abs(), wi.z.abs());
         self.d(m) / (2.0 * (self.stretch(wo) * ci + self.stretch(wi) * co))
@@ -135,24 +135,34 @@ impl Ggx {
     /// Like [`Ggx::sample_visible`], leaving out most normals whose reflection would be lost. On the side of `w`.
     #[inline]
     pub fn sample_bounded_reflection(&self, w: Vec3, u: Point2) -> Option<Vec3> {
+        let (wi, is_above) = self.bounded_reflection(w, u);
+        is_above.then_some(wi)
+    }
+
+    /// As [`Ggx::sample_bounded_reflection`], with whether it is above the horizon, for loops that choose later.
+    #[inline(always)]
+    pub fn bounded_reflection(&self, w: Vec3, u: Point2) -> (Vec3, bool) {
         let flip = w.z < 0.0;
-        let w = if flip { -w } else { w };
+        let turned = |v: Vec3| {
+            Vec3::new(if flip { -v.x } else { v.x }, if flip { -v.y } else { v.y }, if flip { -v.z } else { v.z })
+        };
+        let w = turned(w);
         let s = Vec3::new(self.alpha_x * w.x, self.alpha_y * w.y, w.z).normalize();
         let m = self.facet_from_cap(s, self.bound(w) * s.z, u);
         let wi = m * (2.0 * w.dot(m)) - w;
-        (wi.z > 0.0).then_some(if flip { -wi } else { wi })
+        (turned(wi), wi.z > 0.0)
     }
 
     /// The density of [`Ggx::sample_bounded_reflection`], per steradian, for a half vector `m`.
     ///
     /// Integrates to at most 1: what is missing are samples lost under the horizon.
-    #[inline]
+    #[inline(always)]
     pub fn bounded_pdf(&self, w: Vec3, m: Vec3) -> f32 {
         self.d(m) / (2.0 * (self.bound(w) * w.z.abs() + self.stretch(w)))
     }
 
     /// Eto and Tokuyoshi's k: how much of the lower cap can still reflect above the horizon.
-    #[inline]
+    #[inline(always)]
     fn bound(&self, w: Vec3) -> f32 {
         let a = self.alpha_x.min(self.alpha_y).min(1.0);
         let s = 1.0 + (w.x * w.x + w.y * w.y).sqrt();
@@ -161,9 +171,9 @@ impl Ggx {
     }
 
     /// A cap of the unit sphere down to height `-lower`, as half vectors with `s`, unstretched.
-    #[inline]
+    #[inline(always)]
     fn facet_from_cap(&self, s: Vec3, lower: f32, u: Point2) -> Vec3 {
-        let (sin_phi, cos_phi) = sin_cos(2.0 * PI * u.x);
+        let (sin_phi, cos_phi) = sin_cos_bounded(2.0 * PI * u.x);
         let z = (1.0 - u.y) * (1.0 + lower) - lower;
         let sin_theta = (1.0 - z * z).max(0.0).sqrt();
         let h = Vec3::new(sin_theta * cos_phi + s.x, sin_theta * sin_phi + s.y, z + s.z);

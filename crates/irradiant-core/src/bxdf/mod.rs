@@ -255,8 +255,8 @@ pub enum Bxdf {
 }
 
 /// A direction a model can answer for: unit, finite, not in the surface.
-#[inline]
-fn usable(w: Vec3) -> bool {
+#[inline(always)]
+pub fn is_usable(w: Vec3) -> bool {
     w.z != 0.0 && (w.length_squared() - 1.0).abs() < 0.01
 }
 
@@ -290,7 +290,7 @@ impl Bxdf {
     /// The density with which [`Bxdf::sample`] draws `wi`, 1/sr; deltas are 0.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, mode: TransportMode, which: Sides) -> f32 {
-        if !(usable(wo) && usable(wi)) {
+        if !(is_usable(wo) && is_usable(wi)) {
             return 0.0;
         }
         if !(if wo.z * wi.z > 0.0 { which.reflection() } else { which.transmission() }) {
@@ -314,7 +314,7 @@ impl Bxdf {
     /// Value and density at once, for light sampling: as [`Bxdf::f`] and [`Bxdf::pdf`] with both sides, sharing work.
     #[inline]
     pub fn f_and_pdf(&self, wo: Vec3, wi: Vec3, mode: TransportMode) -> (SampledSpectrum, f32) {
-        if !(usable(wo) && usable(wi)) {
+        if !(is_usable(wo) && is_usable(wi)) {
             return (SampledSpectrum::ZERO, 0.0);
         }
         let (f, pdf) = match self {
@@ -341,7 +341,7 @@ impl Bxdf {
     /// `uc` chooses the lobe, `u` the direction, all in [0, 1).
     #[inline]
     pub fn sample(&self, wo: Vec3, uc: f32, u: Point2, mode: TransportMode, which: Sides) -> Option<BsdfSample> {
-        if !usable(wo) {
+        if !is_usable(wo) {
             return None;
         }
         let sample = match self {
@@ -360,7 +360,7 @@ impl Bxdf {
             && sample.pdf.is_finite()
             && sample.f.is_finite()
             && !sample.f.is_black()
-            && usable(sample.wi);
+            && is_usable(sample.wi);
         good.then_some(sample)
     }
 

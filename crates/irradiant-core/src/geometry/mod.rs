@@ -29,10 +29,15 @@ mod sphere;
 mod tests;
 pub mod textbook;
 mod triangle;
+mod triangle_lanes;
 
 pub use accel::Alpha;
 pub use compile::compile_geometry;
-pub use emitter::{EmitterShape, NormalCone, ShapeSample};
+pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample};
+
+pub use irradiant_bvh::{Kernel, Level};
+pub(crate) use spawn::segment;
+pub use triangle_lanes::{SurfaceLanes, TriangleLanes};
 
 use crate::interaction::{Interaction, LightId, MaterialId, ShapeId, TextureContext};
 use accel::{Group, GroupLeaves, NO_EMITTER, Shapes, User, to_tree};
@@ -117,7 +122,7 @@ pub struct Emitter {
 /// All shapes of a scene, ready to be met by rays. Immutable but for [`Geometry::assign_lights`].
 #[derive(Debug)]
 pub struct Geometry {
-    pub(crate) level: bvh::Level,
+    pub(crate) level: Level,
     pub(crate) shapes: Shapes,
     /// The scene itself, then objects and moving shapes.
     pub(crate) groups: Vec<Group>,
@@ -306,7 +311,7 @@ impl Geometry {
     }
 
     /// Uses other instructions for traversal; results are the same bits.
-    pub fn set_level(&mut self, level: bvh::Level) {
+    pub fn set_level(&mut self, level: Level) {
         self.level = level;
     }
 

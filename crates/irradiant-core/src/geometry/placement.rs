@@ -10,27 +10,27 @@ use irradiant_math::{Bounds3, Normal3, Point2, Point3, Ray, Transform, Vec3};
 /// Three doubles: a point, vector or normal of shape space.
 pub(crate) type Double3 = [f64; 3];
 
-#[inline]
+#[inline(always)]
 pub(crate) fn dot(a: Double3, b: Double3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn cross(a: Double3, b: Double3) -> Double3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn sub(a: Double3, b: Double3) -> Double3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn add(a: Double3, b: Double3) -> Double3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn scale(a: Double3, s: f64) -> Double3 {
     [a[0] * s, a[1] * s, a[2] * s]
 }
@@ -40,7 +40,7 @@ pub(crate) fn lerp3(a: Double3, b: Double3, t: f64) -> Double3 {
     [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn length(a: Double3) -> f64 {
     dot(a, a).sqrt()
 }
@@ -52,12 +52,12 @@ pub(crate) fn axes<T>(f: impl Fn(usize) -> T) -> [T; 3] {
     [f(0), f(1), f(2)]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn double(p: [f32; 3]) -> Double3 {
     [p[0].into(), p[1].into(), p[2].into()]
 }
 
-#[inline]
+#[inline(always)]
 pub(crate) fn single(p: Double3) -> [f32; 3] {
     [p[0] as f32, p[1] as f32, p[2] as f32]
 }

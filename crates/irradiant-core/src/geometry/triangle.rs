@@ -160,7 +160,7 @@ impl Mesh {
     }
 
     /// The point at barycentric weights `u`, `v`: on the triangle's plane up to the rounding of its coordinates.
-    #[inline]
+    #[inline(always)]
     pub fn triangle_point(&self, triangle: u32, u: f32, v: f32) -> (Point3, Vec3) {
         let [i, j, k] = self.triangles[triangle as usize];
         triangle_point([self.position(i), self.position(j), self.position(k)], u, v)
@@ -173,12 +173,7 @@ impl Mesh {
         (at.p, at.p_error) = triangle_point([p0, p1, p2], u, v);
         at.face = self.face(triangle as usize);
         let (dp02, dp12) = (p0 - p2, p1 - p2);
-        // In f64 and scaled by the largest edge, so that no triangle with an area loses its normal.
-        let (e02, e12) = (double(dp02.to_array()), double(dp12.to_array()));
-        let normal = cross(e02, e12);
-        let length = super::placement::length(normal);
-        let normal = if length > 0.0 && length.is_finite() { scale(normal, 1.0 / length) } else { [0.0, 0.0, 1.0] };
-        let mut n: Normal3 = single(normal).into();
+        let (mut n, length) = normal_and_length(dp02, dp12);
         // Derivatives of the default coordinates, which span the triangle itself; below a length of 1e-18 squares vanish.
         let (mut dpdu, mut dpdv) = (p1 - p0, p2 - p1);
         let mut is_flat = !(length > 1e-18);
@@ -272,11 +267,22 @@ pub(crate) fn shade(at: &mut Interaction, ns: Normal3, dpdus: Vec3, dpdvs: Vec3,
     }
 }
 
+/// The normal that the winding says, and the length of the edges' cross product.
+#[inline(always)]
+pub(super) fn normal_and_length(dp02: Vec3, dp12: Vec3) -> (Normal3, f64) {
+    // In f64, so that no triangle with an area loses its normal.
+    let (e02, e12) = (double(dp02.to_array()), double(dp12.to_array()));
+    let normal = cross(e02, e12);
+    let length = super::placement::length(normal);
+    let normal = if length > 0.0 && length.is_finite() { scale(normal, 1.0 / length) } else { [0.0, 0.0, 1.0] };
+    (single(normal).into(), length)
+}
+
 /// A point of a triangle and the bound of its error.
 ///
 /// Evaluated in `f64`, so the point is on the plane up to one rounding; the bound is pbrt's gamma(7) all the same, since
 /// the vertices themselves were rounded and flat things made of several triangles are flat to that precision only.
-#[inline]
+#[inline(always)]
 pub(crate) fn triangle_point(p: [Point3; 3], u: f32, v: f32) -> (Point3, Vec3) {
     let [p0, p1, p2] = p;
     let (q0, q1, q2) = (double(p0.to_array()), double(p1.to_array()), double(p2.to_array()));

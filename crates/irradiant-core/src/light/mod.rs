@@ -28,6 +28,7 @@ pub mod point;
 pub mod portal;
 pub mod projection;
 pub mod spot;
+mod target_lanes;
 
 mod environment_density;
 
@@ -48,6 +49,7 @@ pub use point::PointLight;
 pub use portal::PortalInfiniteLight;
 pub use projection::ProjectionLight;
 pub use spot::SpotLight;
+pub use target_lanes::TargetLanes;
 
 use crate::interaction::{Interaction, ReferencePoint};
 use irradiant_math::{Bounds3, Frame, Normal3, Point2, Point3, Ray, Vec3, warp};

@@ -413,6 +413,62 @@ impl Materials {
         false
     }
 
+    /// The reflectance of a material that is diffuse and the same everywhere, without relief, and what it makes of it.
+    #[inline]
+    pub fn plain_diffuse(
+        &self,
+        id: MaterialId,
+        textures: &Textures,
+        at: &TextureContext,
+        lambda: &Wavelengths,
+    ) -> Option<SampledSpectrum> {
+        let entry = self.entries.get(id.0 as usize)?;
+        match entry.material {
+            Material::Diffuse { reflectance } if !entry.is_textured && !self.force_diffuse => {
+                Some(textures.spectrum(reflectance, at, lambda).clamp(0.0, 1.0))
+            }
+            _ => None,
+        }
+    }
+
+    /// A metal that is rough and the same everywhere, without relief.
+    #[inline]
+    pub fn plain_rough_metal(
+        &self,
+        id: MaterialId,
+        textures: &Textures,
+        at: &TextureContext,
+        lambda: &Wavelengths,
+    ) -> Option<Conductor> {
+        let entry = self.entries.get(id.0 as usize)?;
+        match &entry.material {
+            Material::Conductor { metal, facets: Facets::Constant(facets) }
+                if !entry.is_textured && !self.force_diffuse && !facets.is_smooth() =>
+            {
+                let (eta, k) = metal.at(textures, at, lambda);
+                Some(Conductor::new(eta, k, *facets))
+            }
+            _ => None,
+        }
+    }
+
+    /// How light scatters in the shading frame of a hit, of a material without textures, relief or choices; `None` for others.
+    #[inline]
+    pub fn plain_bsdf(
+        &self,
+        id: MaterialId,
+        frame: Frame,
+        textures: &Textures,
+        at: &TextureContext,
+        lambda: &mut Wavelengths,
+    ) -> Option<Bsdf> {
+        let entry = self.entries.get(id.0 as usize)?;
+        if entry.is_textured || self.force_diffuse {
+            return None;
+        }
+        self.framed(frame, &entry.material, textures, at, lambda)
+    }
+
     /// Whether a material looks anything up in textures, so that it needs to know how large a pixel is where it is met.
     #[inline]
     pub fn is_textured(&self, id: MaterialId) -> bool {

@@ -8,6 +8,10 @@
 //! All of pbrt-v4's samplers are here by name; where an implementation differs, the variant's doc says how. Expected
 //! values never depend on the sampler.
 
+mod lanes;
+
+pub use lanes::{BlockLanes, StreamLanes};
+
 use irradiant_math::Point2;
 use irradiant_math::elementary::ONE_MINUS_EPSILON;
 use irradiant_math::hash::{hash2, hash4, mix32, permutation_element, unit_f32};

@@ -10,6 +10,7 @@
 pub mod halton;
 pub mod morton;
 pub mod owen;
+mod owen_lanes;
 pub mod sobol;
 mod sobol_directions;
 
@@ -21,4 +22,5 @@ pub use owen::{
     laine_karras, nested_uniform_scramble_base2, owen_sobol_1d, owen_sobol_2d, owen_sobol_4d, owen_sobol_4d_bits,
     owen_sobol_4d_of_reversed,
 };
+pub use owen_lanes::owen_sobol_4d_lanes;
 pub use sobol::{N_SOBOL_DIMENSIONS, SobolPixels, sobol, sobol_4d, sobol_64};

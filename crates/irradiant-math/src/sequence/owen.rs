@@ -26,7 +26,7 @@ pub const fn nested_uniform_scramble_base2(v: u32, seed: u32) -> u32 {
 
 /// Independent seeds for the index shuffle (entry 4) and the dimensions of a block, by two 64-bit mixes.
 #[inline(always)]
-const fn block_seeds(seed: u32) -> [u32; 5] {
+pub(super) const fn block_seeds(seed: u32) -> [u32; 5] {
     let a = mix64(seed as u64 ^ 0x9e37_79b9_7f4a_7c15);
     let b = mix64(a.wrapping_add(0xd1b5_4a32_d192_ed03));
     // The fifth from both, so that it equals neither part of either.

@@ -130,6 +130,20 @@ const fn nibbles(reversed: bool) -> [[[u32; 4]; 16]; 8] {
     table
 }
 
+/// What each bit of a reversed index contributes to the reversed coordinates 2 and 3.
+pub(super) const REVERSED_COLUMNS: [[u32; 32]; 2] = [reversed_columns(2), reversed_columns(3)];
+
+const fn reversed_columns(dimension: usize) -> [u32; 32] {
+    let columns = columns(dimension);
+    let mut reversed = [0; 32];
+    let mut bit = 0;
+    while bit < 32 {
+        reversed[31 - bit] = ((columns[bit] >> 32) as u32).reverse_bits();
+        bit += 1;
+    }
+    reversed
+}
+
 #[inline(always)]
 pub(super) fn look_up(table: &[[[u32; 4]; 16]; 8], index: u32) -> [u32; 4] {
     let mut v = [0; 4];

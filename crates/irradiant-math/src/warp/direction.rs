@@ -72,7 +72,7 @@ pub fn uniform_sphere_inverse(v: Vec3) -> Point2 {
 }
 
 /// Cosine-weighted direction about +z. pdf = cos theta / pi, per steradian.
-#[inline]
+#[inline(always)]
 pub fn cosine_hemisphere(u: Point2) -> Vec3 {
     let d = uniform_disk_concentric(u);
     Vec3::new(d.x, d.y, safe_sqrt(1.0 - d.x * d.x - d.y * d.y))

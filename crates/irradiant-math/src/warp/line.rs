@@ -5,7 +5,7 @@ use crate::solve::newton_bisection;
 use crate::vector::Point2;
 
 /// A point of [0, 1) with density linear from `a` (at 0) to `b` (at 1); both >= 0, not both zero.
-#[inline]
+#[inline(always)]
 pub fn linear(u: f32, a: f32, b: f32) -> f32 {
     if u == 0.0 && a == 0.0 {
         return 0.0;

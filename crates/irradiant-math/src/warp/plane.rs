@@ -28,7 +28,7 @@ pub const fn uniform_disk_pdf() -> f32 {
 /// Uniform point of the unit disk; squares around the centre become circles, so strata keep their shape.
 ///
 /// Shirley and Chiu 1997. The centre of the square maps to the centre.
-#[inline]
+#[inline(always)]
 pub fn uniform_disk_concentric(u: Point2) -> Point2 {
     let (x, y) = (2.0 * u.x - 1.0, 2.0 * u.y - 1.0);
     if x == 0.0 && y == 0.0 {
@@ -91,7 +91,7 @@ pub fn uniform_triangle_inverse(b: [f32; 3]) -> Point2 {
 /// A point of the unit square with density bilinear between corner weights `w` at (0,0), (1,0), (0,1), (1,1).
 ///
 /// Weights >= 0, not all zero; for all zero the result is not finite: see [`bilinear_pdf`].
-#[inline]
+#[inline(always)]
 pub fn bilinear(u: Point2, w: [f32; 4]) -> Point2 {
     let y = linear(u.y, w[0] + w[1], w[2] + w[3]);
     let x = linear(u.x, lerp(y, w[0], w[2]), lerp(y, w[1], w[3]));
@@ -99,7 +99,7 @@ pub fn bilinear(u: Point2, w: [f32; 4]) -> Point2 {
 }
 
 /// Density of [`bilinear`] on the unit square, 0 outside; 1 when all weights are zero.
-#[inline]
+#[inline(always)]
 pub fn bilinear_pdf(p: Point2, w: [f32; 4]) -> f32 {
     if !((0.0..=1.0).contains(&p.x) && (0.0..=1.0).contains(&p.y)) {
         return 0.0;

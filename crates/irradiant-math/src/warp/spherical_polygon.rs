@@ -181,8 +181,15 @@ impl SphericalRectangle {
     }
 
     /// As [`SphericalRectangle::new`], for edges along the first two of three orthonormal `axes` and their lengths.
-    #[inline]
+    #[inline(always)]
     pub fn with_axes(p: Point3, s: Point3, axes: [Vec3; 3], lengths: [f32; 2]) -> Option<Self> {
+        let (seen, is_sound) = Self::perhaps(p, s, axes, lengths);
+        is_sound.then_some(seen)
+    }
+
+    /// As [`SphericalRectangle::with_axes`], with whether it is any good, for loops that choose later.
+    #[inline(always)]
+    pub fn perhaps(p: Point3, s: Point3, axes: [Vec3; 3], lengths: [f32; 2]) -> (Self, bool) {
         let d = s - p;
         let [x, y, z] = axes;
         let (x0, y0, height) = (d.dot(x) as f64, d.dot(y) as f64, d.dot(z));
@@ -190,7 +197,8 @@ impl SphericalRectangle {
         let h2 = h * h;
         let (c0, c1) = (x0 * x0 + h2, x1 * x1 + h2);
         let (s0, s1) = (y0 * y0, y1 * y1);
-        let corners = [c0 + s0, c1 + s0, c0 + s1, c1 + s1].map(f64::sqrt);
+        // Written out, not mapped: loops over many points become vector code.
+        let corners = [(c0 + s0).sqrt(), (c1 + s0).sqrt(), (c0 + s1).sqrt(), (c1 + s1).sqrt()];
         let start = edge_turn(x0, y0, y1, h, corners[0], corners[2]);
         let solid_angle = edge_turn(x1, y0, y1, h, corners[1], corners[3]).minus(start).angle();
         // A point of the plane itself, but for rounding, must not see a half-space of rectangle: a lamp would light itself.
@@ -198,7 +206,7 @@ impl SphericalRectangle {
         // Far away or almost in its plane, rounding leaves nothing (or a full turn); NaN compares false too.
         let sound = h > rounding as f64 && solid_angle > 0.0 && solid_angle < std::f64::consts::TAU;
         let z = if height < 0.0 { -z } else { z };
-        sound.then_some(Self { origin: p, x, y, z, x0, x1, y0, y1, h, corners, start, solid_angle })
+        (Self { origin: p, x, y, z, x0, x1, y0, y1, h, corners, start, solid_angle }, sound)
     }
 
     /// Solid angle, in (0, 2 pi) steradians; its reciprocal is the density of [`SphericalRectangle::sample`].
@@ -216,11 +224,12 @@ impl SphericalRectangle {
     /// Distances of the corners `s`, `s + ex`, `s + ey`, `s + ex + ey`.
     #[inline]
     pub fn corner_distances(&self) -> [f32; 4] {
-        self.corners.map(|d| d as f32)
+        let [a, b, c, d] = self.corners;
+        [a as f32, b as f32, c as f32, d as f32]
     }
 
     /// Where on the rectangle a direction uniform over its solid angle leads: distances from `s` along the edges.
-    #[inline]
+    #[inline(always)]
     pub fn sample_along(&self, u: Point2) -> [f32; 2] {
         let (h, y0, y1) = (self.h, self.y0, self.y1);
         let h2 = h * h;
@@ -249,7 +258,11 @@ impl SphericalRectangle {
         let s1 = y1 / (d2 + y1 * y1).sqrt();
         let s = s0 + u.y as f64 * (s1 - s0);
         let rest = 1.0 - s * s;
-        let y = if rest > 1e-12 { (s * (d2 / rest).sqrt()).clamp(y0, y1) } else { y1 };
+        let y = s * (d2 / rest).sqrt();
+        // As `clamp`, which would ask whether y0 <= y1.
+        let y = if y < y0 { y0 } else { y };
+        let y = if y > y1 { y1 } else { y };
+        let y = if rest > 1e-12 { y } else { y1 };
         [(x - self.x0) as f32, (y - y0) as f32]
     }
 

@@ -10,11 +10,13 @@
 mod bilinear;
 mod quadric;
 mod rectangle;
+mod rectangle_lanes;
 mod triangle;
 
 pub use bilinear::BilinearEmitter;
 pub use quadric::{CylinderEmitter, DiskEmitter, SphereEmitter};
 pub use rectangle::RectangleEmitter;
+pub use rectangle_lanes::RectangleLanes;
 pub use triangle::TriangleEmitter;
 
 use crate::interaction::ReferencePoint;
@@ -208,14 +210,14 @@ enum Drawn {
 
 /// True when a point at `height` over a plane may just as well be on it, both being known with an error: as is every
 /// point of a flat shape itself, which would otherwise light itself from within that error, at any angle.
-#[inline]
+#[inline(always)]
 fn is_on_plane(at: &ReferencePoint, height: f32, error: Vec3) -> bool {
     let e = at.p_error + error;
     height <= e.x + e.y + e.z
 }
 
 /// distance^2 / |cos|; `None` edge-on or at distance zero.
-#[inline]
+#[inline(always)]
 fn solid_angle_per_area_inverse(to: Vec3, n: Normal3) -> Option<f32> {
     let d2 = to.length_squared();
     let cos = n.dot(to).abs() / d2.sqrt();
@@ -229,9 +231,10 @@ fn cosine_weights(ns: Normal3, directions: [Vec3; 4]) -> [f32; 4] {
 }
 
 /// The same from cosines.
-#[inline]
+#[inline(always)]
 fn cosine_weights_of(cosines: [f32; 4]) -> [f32; 4] {
-    cosines.map(|c| c.abs().max(0.01))
+    let [a, b, c, d] = cosines;
+    [a.abs().max(0.01), b.abs().max(0.01), c.abs().max(0.01), d.abs().max(0.01)]
 }
 
 /// Flat shapes whose squared radius is less than this share of their squared distance are sampled by area.
@@ -258,7 +261,7 @@ impl Nearness {
     }
 
     /// False for NaN.
-    #[inline]
+    #[inline(always)]
     fn is_far(&self, p: Point3) -> bool {
         (p - self.center).length_squared() > self.limit
     }

@@ -16,20 +16,20 @@ const SLACK: f64 = 2e-5;
 /// A rectangle that may emit.
 #[derive(Clone, Debug)]
 pub struct RectangleEmitter {
-    corner: Point3,
+    pub(super) corner: Point3,
     /// Full edges.
-    ex: Vec3,
-    ey: Vec3,
+    pub(super) ex: Vec3,
+    pub(super) ey: Vec3,
     /// Orthonormal: along the edges, and across.
-    axes: [Vec3; 3],
-    lengths: [f32; 2],
-    near: Nearness,
+    pub(super) axes: [Vec3; 3],
+    pub(super) lengths: [f32; 2],
+    pub(super) near: Nearness,
     area: f32,
-    per_area: f32,
+    pub(super) per_area: f32,
     /// On the outer side, unit.
-    n: Normal3,
+    pub(super) n: Normal3,
     /// Holds for every point.
-    p_error: Vec3,
+    pub(super) p_error: Vec3,
     /// Of the triangle at `corner`, and of the one across: texture coordinates of its right angle, then of the ends of
     /// `ex` and `ey`.
     uvs: [[[f32; 2]; 3]; 2],
@@ -136,9 +136,21 @@ impl RectangleEmitter {
         if at.ns == Normal3::ZERO {
             return None;
         }
-        let (c, x, y) = (at.ns.dot(self.corner - at.p), at.ns.dot(self.ex), at.ns.dot(self.ey));
+        Some(Self::weights_at(at.p, at.ns, self.corner, self.ex, self.ey, seen))
+    }
+
+    #[inline(always)]
+    pub(super) fn weights_at(
+        p: Point3,
+        ns: Normal3,
+        corner: Point3,
+        ex: Vec3,
+        ey: Vec3,
+        seen: &SphericalRectangle,
+    ) -> [f32; 4] {
+        let (c, x, y) = (ns.dot(corner - p), ns.dot(ex), ns.dot(ey));
         let [d00, d10, d01, d11] = seen.corner_distances();
-        Some(cosine_weights_of([c / d00, (c + x) / d10, (c + y) / d01, (c + x + y) / d11]))
+        cosine_weights_of([c / d00, (c + x) / d10, (c + y) / d01, (c + x + y) / d11])
     }
 
     #[inline]

@@ -1,0 +1,83 @@
+//! The random numbers of many samples side by side.
+
+use super::{BLOCKS_PER_VERTEX, CAMERA_BLOCKS, LightDraws, SampleStream, Source};
+use irradiant_math::Point2;
+use irradiant_math::lanes::{Floats, LANES};
+use irradiant_math::sequence::owen_sobol_4d_lanes;
+use irradiant_scene::desc::Randomization;
+
+/// Many samples' streams.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct StreamLanes {
+    reversed_index: [u32; LANES],
+    seed: [u32; LANES],
+}
+
+/// A block of each.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct BlockLanes(pub [Floats; 4]);
+
+impl StreamLanes {
+    /// Of nothing yet.
+    pub const NONE: Self = Self { reversed_index: [0; LANES], seed: [0; LANES] };
+
+    /// Sets a lane; false for samplers that cannot be drawn from side by side.
+    #[inline]
+    pub fn set(&mut self, i: usize, stream: &SampleStream) -> bool {
+        let Source::Padded { reversed_index, seed, randomization: Randomization::FastOwen | Randomization::Owen } =
+            stream.source
+        else {
+            return false;
+        };
+        (self.reversed_index[i], self.seed[i]) = (reversed_index, seed);
+        true
+    }
+
+    /// Lane `from` goes to lane `to`.
+    #[inline(always)]
+    pub fn shift(&mut self, to: usize, from: usize) {
+        (self.reversed_index[to], self.seed[to]) = (self.reversed_index[from], self.seed[from]);
+    }
+
+    /// As [`SampleStream::light`], of `n` lanes.
+    #[inline(always)]
+    pub fn light(&self, n: usize, depth: u32, out: &mut BlockLanes) {
+        self.block(n, CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX, out);
+    }
+
+    /// As [`SampleStream::scatter`], of `n` lanes.
+    #[inline(always)]
+    pub fn scatter(&self, n: usize, depth: u32, out: &mut BlockLanes) {
+        self.block(n, CAMERA_BLOCKS + 1 + depth * BLOCKS_PER_VERTEX, out);
+    }
+
+    #[inline(always)]
+    fn block(&self, n: usize, block: u32, out: &mut BlockLanes) {
+        owen_sobol_4d_lanes(n, &self.reversed_index, &self.seed, block, &mut out.0);
+    }
+}
+
+impl BlockLanes {
+    /// All zero.
+    pub const ZERO: Self = Self([[0.0; LANES]; 4]);
+
+    /// Where on the light, or which direction.
+    #[inline(always)]
+    pub fn uv(&self, i: usize) -> Point2 {
+        Point2::new(self.0[0][i], self.0[1][i])
+    }
+
+    /// Roulette, of a scattering block.
+    #[inline(always)]
+    pub fn roulette(&self, i: usize) -> f32 {
+        self.0[3][i]
+    }
+
+    /// A lane of a light's block.
+    #[inline]
+    pub fn light_draws(&self, i: usize) -> LightDraws {
+        LightDraws { pick: self.0[2][i], uv: self.uv(i), resample: self.0[3][i] }
+    }
+}

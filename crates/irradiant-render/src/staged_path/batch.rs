@@ -1,0 +1,286 @@
+//! The numbers of many paths side by side, between vertices and at them.
+
+use crate::path::{Previous, Walk, power_heuristic};
+use irradiant_core::bsdf::Bsdf;
+use irradiant_core::bxdf::conductor::MirrorLobe;
+use irradiant_core::bxdf::{Conductor, Ggx};
+use irradiant_core::geometry::{Hit, RectangleLanes, SurfaceLanes, TriangleLanes};
+use irradiant_core::interaction::ReferencePoint;
+use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
+use irradiant_core::light::{PixelLine, PixelRun, TargetLanes};
+use irradiant_core::light_sampler::PickedLight;
+use irradiant_core::sampler::{BlockLanes, StreamLanes};
+use irradiant_core::scene::Scene;
+use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
+use irradiant_math::{Normal3, Point2, Point3, Ray};
+use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+
+/// How a path's vertex scatters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scattering {
+    /// Diffusely, by the reflectance of its lane.
+    Diffuse,
+    /// As a rough metal, that of its lane.
+    Metal,
+    /// By a model of its own: its place among those of the batch.
+    Alone(u32),
+    /// Not here: the path has been taken to its end.
+    Gone,
+}
+
+/// What a path meets.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Surface {
+    /// A flat triangle of this material, perhaps a lamp.
+    Flat(MaterialId, Option<LightId>),
+    /// Something else.
+    Other,
+}
+
+/// What a material is that is the same everywhere.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Plain {
+    /// Diffuse, of this reflectance.
+    Diffuse(SampledSpectrum),
+    /// A rough metal.
+    Metal(Conductor),
+    /// Another one, or it varies.
+    Other,
+}
+
+impl Plain {
+    pub fn of(scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> Self {
+        let (materials, textures, nowhere) = (&scene.materials, &scene.textures, nowhere());
+        if let Some(reflectance) = materials.plain_diffuse(material, textures, &nowhere, lambda) {
+            Self::Diffuse(reflectance)
+        } else if let Some(metal) = materials.plain_rough_metal(material, textures, &nowhere, lambda) {
+            Self::Metal(metal)
+        } else {
+            Self::Other
+        }
+    }
+}
+
+/// Nothing varies over plain materials, so that any place will do.
+pub(super) fn nowhere() -> TextureContext {
+    TextureContext::without_footprint(Point3::ZERO, Normal3::ZERO, Point2::ZERO, 0)
+}
+
+/// What the paths of a batch carry, side by side.
+#[repr(C, align(64))]
+pub(crate) struct Batch {
+    // Between vertices.
+    pub(super) o: Triples,
+    pub(super) d: Triples,
+    pub(super) time: Floats,
+    pub(super) streams: StreamLanes,
+    pub(super) previous: [Triples; 4],
+    pub(super) bsdf_pdf: Floats,
+    pub(super) specular: [bool; LANES],
+    pub(super) throughput: [SampledSpectrum; LANES],
+    pub(super) roulette_scale: Floats,
+    pub(super) met: [Option<Hit>; LANES],
+    pub(super) escape_place: [Option<Point2>; LANES],
+    /// Which of the batch's samples.
+    pub(super) sample: [u32; LANES],
+
+    // At a vertex.
+    pub(super) surface: [Surface; LANES],
+    /// What is known of each material, where that is the same for all paths: in the RGB basis.
+    pub(super) known: Vec<Option<Plain>>,
+    pub(super) triangles: TriangleLanes,
+    pub(super) at: SurfaceLanes,
+    pub(super) scattering: [Scattering; LANES],
+    pub(super) reflectance: [SampledSpectrum; LANES],
+    pub(super) metals: [Conductor; LANES],
+    pub(super) is_metal: [u32; LANES],
+    pub(super) alphas: [Floats; 2],
+    /// Of the last directions asked for: cosine with the facet, value, density.
+    pub(super) lobes: [Floats; 3],
+    pub(super) bsdfs: Vec<Bsdf>,
+    pub(super) light: BlockLanes,
+    pub(super) scatter: BlockLanes,
+
+    // Light samples.
+    pub(super) lamps: RectangleLanes,
+    /// The lamp that each lane holds.
+    pub(super) lamp: [u32; LANES],
+    pub(super) two_sided: [u32; LANES],
+    pub(super) targets: TargetLanes,
+    pub(super) is_delta: [u32; LANES],
+    pub(super) arriving: [SampledSpectrum; LANES],
+    /// The chance with which the light was picked; 0 where none is sampled.
+    pub(super) pmf: Floats,
+    /// The cosine where it is scattered, and the weight of the sample over its density.
+    pub(super) light_cosine: Floats,
+    pub(super) light_factor: Floats,
+    /// Paths whose light samples are drawn alone, and their way to the sky.
+    pub(super) light_alone: Vec<(u32, PickedLight, Option<PixelLine>)>,
+    pub(super) light_runs: Vec<Option<PixelRun>>,
+    pub(super) shadow_rays: Vec<Ray>,
+    pub(super) shadow_ends: Vec<f32>,
+    /// The sample that each would bring this to.
+    pub(super) shadow_light: Vec<(u32, SampledSpectrum)>,
+
+    // Directions of diffuse surfaces and metals.
+    pub(super) next_o: Triples,
+    pub(super) next_d: Triples,
+    pub(super) next_pdf: Floats,
+    /// cos / pdf; negative where nothing is scattered.
+    pub(super) next_factor: Floats,
+}
+
+const NO_LAMP: u32 = u32::MAX;
+
+impl Batch {
+    /// For paths of this scene.
+    pub fn new(scene: &Scene) -> Box<Self> {
+        Box::new(Self {
+            o: Triples::ZERO,
+            d: Triples::ZERO,
+            time: [0.0; LANES],
+            streams: StreamLanes::NONE,
+            previous: [Triples::ZERO; 4],
+            bsdf_pdf: [0.0; LANES],
+            specular: [false; LANES],
+            throughput: [SampledSpectrum::ZERO; LANES],
+            roulette_scale: [0.0; LANES],
+            met: [None; LANES],
+            escape_place: [None; LANES],
+            sample: [0; LANES],
+            surface: [Surface::Other; LANES],
+            known: vec![None; scene.materials.len()],
+            triangles: TriangleLanes::NONE,
+            at: SurfaceLanes::ZERO,
+            scattering: [Scattering::Gone; LANES],
+            reflectance: [SampledSpectrum::ZERO; LANES],
+            metals: [Conductor::new(SampledSpectrum::ONE, SampledSpectrum::ONE, Ggx::SMOOTH); LANES],
+            is_metal: [0; LANES],
+            alphas: [[1.0; LANES]; 2],
+            lobes: [[0.0; LANES]; 3],
+            bsdfs: Vec::new(),
+            light: BlockLanes::ZERO,
+            scatter: BlockLanes::ZERO,
+            lamps: RectangleLanes::NONE,
+            lamp: [NO_LAMP; LANES],
+            two_sided: [0; LANES],
+            targets: TargetLanes::NONE,
+            is_delta: [0; LANES],
+            arriving: [SampledSpectrum::ZERO; LANES],
+            pmf: [0.0; LANES],
+            light_cosine: [0.0; LANES],
+            light_factor: [0.0; LANES],
+            light_alone: Vec::new(),
+            light_runs: Vec::new(),
+            shadow_rays: Vec::new(),
+            shadow_ends: Vec::new(),
+            shadow_light: Vec::new(),
+            next_o: Triples::ZERO,
+            next_d: Triples::ZERO,
+            next_pdf: [0.0; LANES],
+            next_factor: [0.0; LANES],
+        })
+    }
+
+    #[inline(always)]
+    pub fn ray(&self, i: usize) -> Ray {
+        Ray::new(self.o.point(i), self.d.vector(i), self.time[i])
+    }
+
+    /// A path on its way to what it meets.
+    pub fn walk(&self, i: usize, depth: u32) -> Walk {
+        let previous = (depth > 0).then(|| {
+            let [p, p_error, n, ns] = &self.previous;
+            let reference =
+                ReferencePoint { p: p.point(i), p_error: p_error.vector(i), n: n.normal(i), ns: ns.normal(i) };
+            Previous { reference, bsdf_pdf: self.bsdf_pdf[i], specular: self.specular[i], light_splits: 1 }
+        });
+        Walk {
+            throughput: self.throughput[i],
+            depth,
+            roulette_scale: self.roulette_scale[i],
+            previous,
+            // Only regularisation asks, which has no stages.
+            any_non_specular: depth > 0,
+            escape_place: self.escape_place[i],
+            ..Walk::from_camera(self.ray(i), self.met[i])
+        }
+    }
+
+    /// What a path carries goes from lane `from` to lane `to`.
+    #[inline(always)]
+    pub fn shift(&mut self, to: usize, from: usize) {
+        if to == from {
+            return;
+        }
+        self.o.shift(to, from);
+        self.d.shift(to, from);
+        self.time[to] = self.time[from];
+        self.streams.shift(to, from);
+        self.previous.iter_mut().for_each(|t| t.shift(to, from));
+        self.bsdf_pdf[to] = self.bsdf_pdf[from];
+        self.specular[to] = self.specular[from];
+        self.throughput[to] = self.throughput[from];
+        self.roulette_scale[to] = self.roulette_scale[from];
+        self.met[to] = self.met[from];
+        self.escape_place[to] = self.escape_place[from];
+        self.sample[to] = self.sample[from];
+    }
+
+    /// The weight of a lane's light sample over its density, where scattering finds its direction with the density `pdf`.
+    #[inline(always)]
+    pub fn light_weight(&self, i: usize, pdf: f32) -> f32 {
+        let light_pdf = self.pmf[i] * self.targets.pdf[i];
+        let weight = power_heuristic(light_pdf, pdf);
+        (if self.is_delta[i] != 0 { 1.0 } else { weight }) / light_pdf
+    }
+
+    /// Whether any of the lanes of a vector is one of metal.
+    #[inline(always)]
+    pub fn has_metal(&self, first: usize) -> bool {
+        self.is_metal[first..first + WHOLE].iter().fold(0, |any, metal| any | metal) != 0
+    }
+
+    #[inline(always)]
+    pub fn set_lobe(&mut self, i: usize, lobe: &MirrorLobe) {
+        (self.lobes[0][i], self.lobes[1][i], self.lobes[2][i]) = (lobe.cos, lobe.value, lobe.pdf);
+    }
+
+    /// What a lane's metal scatters in the direction last asked for, without cosine.
+    #[inline]
+    pub fn metal_f(&self, i: usize) -> SampledSpectrum {
+        self.metals[i].fresnel(self.lobes[0][i]) * self.lobes[1][i]
+    }
+
+    /// Makes a lane's surface scatter so.
+    #[inline(always)]
+    pub fn set_metal(&mut self, i: usize, metal: Conductor) {
+        let [x, y] = metal.facets().alphas();
+        (self.metals[i], self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (metal, 1, x, y);
+        self.scattering[i] = Scattering::Metal;
+    }
+
+    #[inline(always)]
+    pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
+        self.reflectance[i] = reflectance;
+        self.scattering[i] = Scattering::Diffuse;
+    }
+
+    pub fn set_alone(&mut self, i: usize, bsdf: Bsdf) {
+        self.scattering[i] = Scattering::Alone(self.bsdfs.len() as u32);
+        self.bsdfs.push(bsdf);
+    }
+
+    /// All that lights look at.
+    pub fn interaction(&self, i: usize) -> Interaction {
+        let n: Normal3 = self.at.n.normal(i);
+        Interaction {
+            p: self.at.p.point(i),
+            p_error: self.at.p_error.vector(i),
+            n,
+            ns: self.at.ns.normal(i),
+            wo: self.at.wo.vector(i),
+            ..Interaction::unknown(&self.ray(i), 0.0)
+        }
+    }
+}

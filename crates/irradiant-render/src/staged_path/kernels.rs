@@ -1,0 +1,146 @@
+//! Stages that are computed in lanes.
+
+use super::batch::Batch;
+use irradiant_core::bxdf::conductor::mirror_lobe;
+use irradiant_core::bxdf::{Ggx, is_usable};
+use irradiant_core::geometry::Kernel;
+use irradiant_math::lanes::{WHOLE, whole};
+use irradiant_math::warp::cosine_hemisphere;
+use irradiant_math::{Point3, Vec3, offset_ray_origin};
+use std::f32::consts::FRAC_1_PI;
+
+/// Flat surfaces.
+pub(super) struct Surfaces<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for Surfaces<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        b.triangles.surfaces(n, &b.d, &mut b.at);
+    }
+}
+
+/// The random numbers of a vertex.
+pub(super) struct Numbers<'a>(pub &'a mut Batch, pub usize, pub u32);
+
+impl Kernel for Numbers<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n, depth) = self;
+        b.streams.light(n, depth, &mut b.light);
+        b.streams.scatter(n, depth, &mut b.scatter);
+    }
+}
+
+/// Points of rectangular lamps.
+pub(super) struct SampleLamps<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for SampleLamps<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        let [u, v, ..] = &b.light.0;
+        b.lamps.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+    }
+}
+
+/// How much of the light samples is scattered along the path, but for models of their own; the rays that ask for what is in the way.
+pub(super) struct Weigh<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for Weigh<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        b.targets.aim(n, &b.at);
+        for i in whole(n) {
+            let frame = b.at.frame(i);
+            let wi = b.targets.wi.vector(i);
+            let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
+            let pdf = local_i.z.abs() * FRAC_1_PI;
+            let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
+            let cosine = wi.dot(frame.z).abs();
+            b.light_factor[i] = b.light_weight(i, pdf);
+            b.light_cosine[i] = if scatters { cosine } else { 0.0 };
+        }
+        for first in whole(n).step_by(WHOLE) {
+            if !b.has_metal(first) {
+                continue;
+            }
+            for i in first..first + WHOLE {
+                let frame = b.at.frame(i);
+                let wi = b.targets.wi.vector(i);
+                let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
+                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
+                let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
+                let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+                b.set_lobe(i, &lobe);
+                let is_metal = b.is_metal[i] != 0;
+                let cosine = if scatters { wi.dot(frame.z).abs() } else { 0.0 };
+                let factor = b.light_weight(i, lobe.pdf);
+                b.light_factor[i] = if is_metal { factor } else { b.light_factor[i] };
+                b.light_cosine[i] = if is_metal { cosine } else { b.light_cosine[i] };
+            }
+        }
+    }
+}
+
+/// Directions that diffuse surfaces and metals scatter to, and the rays that go there.
+pub(super) struct Scatter<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for Scatter<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        for i in whole(n) {
+            let frame = b.at.frame(i);
+            let wo = frame.to_local(b.at.wo.vector(i));
+            let drawn = cosine_hemisphere(b.scatter.uv(i));
+            let pdf = drawn.z * FRAC_1_PI;
+            let local = Vec3::new(drawn.x, drawn.y, drawn.z.copysign(wo.z));
+            let is_good = is_usable(wo) & (pdf > 0.0) & (pdf < f32::INFINITY) & is_usable(local);
+            let wi = frame.from_local(local);
+            let factor = wi.dot(frame.z).abs() / pdf;
+            b.next_d.set(i, wi.to_array());
+            b.next_pdf[i] = pdf;
+            b.next_factor[i] = if is_good { factor } else { -1.0 };
+        }
+        for first in whole(n).step_by(WHOLE) {
+            if !b.has_metal(first) {
+                continue;
+            }
+            for i in first..first + WHOLE {
+                let frame = b.at.frame(i);
+                let wo = frame.to_local(b.at.wo.vector(i));
+                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
+                let (local, is_above) = facets.bounded_reflection(wo, b.scatter.uv(i));
+                let (lobe, is_lit) = mirror_lobe(&facets, wo, local);
+                let is_good = is_usable(wo)
+                    & is_above
+                    & is_lit
+                    & (lobe.pdf > 0.0)
+                    & (lobe.pdf < f32::INFINITY)
+                    & is_usable(local);
+                b.set_lobe(i, &lobe);
+                let wi = frame.from_local(local);
+                let factor = wi.dot(frame.z).abs() / lobe.pdf;
+                let factor = if is_good { factor } else { -1.0 };
+                let is_metal = b.is_metal[i] != 0;
+                let choose = |a: f32, b: f32| if is_metal { a } else { b };
+                let other = b.next_d.vector(i);
+                b.next_d.set(i, [choose(wi.x, other.x), choose(wi.y, other.y), choose(wi.z, other.z)]);
+                b.next_pdf[i] = choose(lobe.pdf, b.next_pdf[i]);
+                b.next_factor[i] = choose(factor, b.next_factor[i]);
+            }
+        }
+        for i in whole(n) {
+            let wi = b.next_d.vector(i);
+            let o: Point3 = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
+            b.next_o.set(i, o.to_array());
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Paths in batches have the bits of paths one at a time: sums of radiance and of its squares, and all counts.
+
+use irradiant::core::film::FilmTile;
+use irradiant::core::geometry::Level;
+use irradiant::renderer::camera_samples::for_each_sample;
+use irradiant::renderer::path::{PathIntegrator, Roulette};
+use irradiant::renderer::record::NoRecord;
+use irradiant::renderer::{Integrator, RenderStats, WorkUnit};
+use irradiant::{ColorMode, Job, RenderSettings, load_text};
+use std::sync::Arc;
+
+const HEAD: &str = "Film \"rgb\" \"integer xresolution\" 37 \"integer yresolution\" 29\nSampler \"zsobol\" \"integer pixelsamples\" 8\nLookAt 0 1 -3.6  0 1 0  0 1 0\nCamera \"perspective\" \"float fov\" 40\nWorldBegin\n";
+/// A room of walls without a front; the first and the last are wound the other way.
+const ROOM: &str = "Material \"diffuse\" \"rgb reflectance\" [ .7 .7 .6 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 2 1 0 3 2 4 5 6 4 6 7 8 9 10 8 10 11 ] \"point3 P\" [ -1 0 -1  1 0 -1  1 0 1  -1 0 1   -1 2 -1  1 2 -1  1 2 1  -1 2 1   -1 0 1  1 0 1  1 2 1  -1 2 1 ]\nMaterial \"diffuse\" \"rgb reflectance\" [ .6 .1 .05 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ -1 0 -1  -1 0 1  -1 2 1  -1 2 -1 ]\nReverseOrientation\nMaterial \"diffuse\" \"rgb reflectance\" [ .1 .4 .1 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ 1 0 -1  1 0 1  1 2 1  1 2 -1 ]\nReverseOrientation\n";
+
+/// A rectangular lamp around a place, facing down.
+fn lamp(parameters: &str, x: f32, y: f32, z: f32, size: f32) -> String {
+    let (a, b, c, d) = (x - size, x + size, z - size, z + size);
+    format!(
+        "AttributeBegin\nMaterial \"diffuse\" \"rgb reflectance\" [ 0 0 0 ]\nAreaLightSource \"diffuse\" {parameters}\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ {a} {y} {c}  {b} {y} {c}  {b} {y} {d}  {a} {y} {d} ]\nAttributeEnd\n"
+    )
+}
+
+fn ceiling_lamp() -> String {
+    lamp("\"rgb L\" [ 17 12 4 ]", 0.0, 1.98, 0.0, 0.3)
+}
+
+/// The picture's sums and the counts, by batches or one path at a time.
+fn picture(job: &Job, integrator: &PathIntegrator, in_batches: bool) -> (FilmTile, RenderStats) {
+    let scene = &job.scene;
+    let unit = WorkUnit { bounds: scene.bounds(), samples: 0..scene.samples_per_pixel };
+    let mut tile = FilmTile::new(unit.bounds, scene.new_film().channels_per_pixel());
+    let mut stats = RenderStats::default();
+    if in_batches {
+        integrator.render(scene, &unit, &mut tile, &mut stats);
+    } else {
+        for_each_sample(scene, &unit, &mut tile, &mut stats, |sample, ray, lambda, layers, stats| {
+            integrator.radiance(scene, ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
+        });
+    }
+    (tile, stats)
+}
+
+fn assert_same_by(integrator: &PathIntegrator, text: &str) {
+    for color in [ColorMode::Rgb, ColorMode::Spectral] {
+        let file = load_text("scene", text, ".").unwrap_or_else(|e| panic!("{e}"));
+        let settings = RenderSettings { color, ..RenderSettings::default() };
+        let mut job = Job::new(&file, &settings).unwrap_or_else(|e| panic!("{e}"));
+        let alone = picture(&job, integrator, false);
+        assert!(alone.1.shadow_rays > 1000 && alone.1.longest_path > 1, "nothing to compare: {:?}", alone.1);
+        for level in Level::available() {
+            Arc::get_mut(&mut job.scene).expect("one owner").geometry.set_level(level);
+            let batches = picture(&job, integrator, true);
+            assert_eq!(alone.1, batches.1, "{level:?} {color:?}\n{text}");
+            assert!(alone.0 == batches.0, "pixels differ: {level:?} {color:?}\n{text}");
+        }
+    }
+}
+
+fn assert_same(text: &str) {
+    assert_same_by(&PathIntegrator::default(), text);
+}
+
+#[test]
+fn a_room_with_a_lamp() {
+    assert_same(&format!("{HEAD}{ROOM}{}", ceiling_lamp()));
+}
+
+#[test]
+fn limits_and_constant_roulette() {
+    let text = format!("{HEAD}{ROOM}{}", ceiling_lamp());
+    assert_same_by(&PathIntegrator { max_depth: Some(2), ..PathIntegrator::default() }, &text);
+    assert_same_by(&PathIntegrator { roulette: Roulette::Constant(0.3), ..PathIntegrator::default() }, &text);
+}
+
+#[test]
+fn lamps_of_all_kinds() {
+    let lamps = [
+        ceiling_lamp(),
+        lamp("\"rgb L\" [ 2 9 3 ] \"bool twosided\" true", 0.5, 1.0, 0.4, 0.1),
+        lamp("\"rgb L\" [ 1 2 9 ]", -0.6, 0.02, 0.2, 0.2),
+        "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 5 5 5 ]\nTranslate -0.5 1.2 0.3\nShape \"sphere\" \"float radius\" 0.1\nAttributeEnd\n".into(),
+        "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 5 1 5 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ -.9 .5 0  -.9 1 0  -.9 1 .5 ]\nAttributeEnd\n".into(),
+        "LightSource \"point\" \"rgb I\" [ .3 .2 .2 ] \"point3 from\" [ 0 1 -.5 ]\n".into(),
+    ];
+    assert_same(&format!("{HEAD}{ROOM}{}", lamps.concat()));
+}
+
+#[test]
+fn mixed_materials_textures_and_relief() {
+    assert_same(&format!(
+        "{HEAD}{ROOM}{}Texture \"check\" \"spectrum\" \"checkerboard\" \"float uscale\" 8 \"float vscale\" 8 \"rgb tex1\" [ .8 .7 .1 ] \"rgb tex2\" [ .1 .1 .3 ]\nMaterial \"diffuse\" \"texture reflectance\" \"check\"\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ -.8 .1 .5  .2 .1 .6  -.4 .9 .7 ] \"point2 uv\" [ 0 0 1 0 0 1 ]\nTranslate 0.3 0.4 0\nMaterial \"conductor\" \"float roughness\" 0.1\nShape \"sphere\" \"float radius\" 0.4\nTranslate -0.6 0.2 -0.3\nMaterial \"coateddiffuse\" \"rgb reflectance\" [ .2 .3 .7 ]\nShape \"disk\" \"float radius\" 0.3\nMaterial \"diffuse\"\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 0  .5 0 .1  .2 .6 0 ] \"normal N\" [ 0 0 -1  .3 0 -1  0 .3 -1 ]\n",
+        ceiling_lamp()
+    ));
+}
+
+#[test]
+fn under_a_sky_with_glass_and_depth_of_field() {
+    let head =
+        HEAD.replace("\"float fov\" 40", "\"float fov\" 40 \"float lensradius\" 0.05 \"float focaldistance\" 3.6");
+    assert_same(&format!(
+        "{head}LightSource \"infinite\" \"rgb L\" [ .5 .6 .7 ]\n{ROOM}{}Translate 0.2 0.5 -0.4\nMaterial \"dielectric\" \"spectrum eta\" \"glass-F11\"\nShape \"sphere\" \"float radius\" 0.5\nMaterial \"interface\"\nShape \"sphere\" \"float radius\" 0.6\n",
+        ceiling_lamp()
+    ));
+}
+
+#[test]
+fn instances_motion_and_openings() {
+    assert_same(&format!(
+        "{HEAD}{ROOM}{}ObjectBegin \"thing\"\nMaterial \"diffuse\" \"rgb reflectance\" [ .8 .2 .1 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ -.3 0 0  .3 0 0  0 .5 .2 ]\nObjectEnd\nObjectInstance \"thing\"\nShape \"trianglemesh\" \"float alpha\" 0.5 \"integer indices\" [ 0 1 2 ] \"point3 P\" [ -.8 .2 -.5  .3 .2 -.5  0 .9 -.4 ]\nAttributeBegin\nActiveTransform EndTime\nTranslate 0.3 0.3 0\nActiveTransform All\nObjectInstance \"thing\"\nAttributeEnd\n",
+        ceiling_lamp()
+    ));
+}
