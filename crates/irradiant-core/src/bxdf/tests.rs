@@ -603,7 +603,7 @@ fn hostile_directions_give_zeros_and_no_nan() {
                         let (f, pdf) = case.bxdf.f_and_pdf(wo, wi, mode);
                         assert!(f.is_finite() && f.min_component() >= 0.0, "{} {wo:?} {wi:?} {f:?}", case.name);
                         assert!(pdf.is_finite() && pdf >= 0.0, "{} {wo:?} {wi:?} {pdf}", case.name);
-                        if !usable(wo) || !usable(wi) {
+                        if !is_usable(wo) || !is_usable(wi) {
                             assert!(f.is_black() && pdf == 0.0, "{}", case.name);
                         }
                         for which in [Sides::Reflection, Sides::Transmission] {
@@ -620,7 +620,7 @@ fn hostile_directions_give_zeros_and_no_nan() {
                                 let Some(s) = case.bxdf.sample(wo, uc, u, TransportMode::Radiance, which) else {
                                     continue;
                                 };
-                                assert!(usable(wo) && usable(s.wi), "{} {wo:?} {s:?}", case.name);
+                                assert!(is_usable(wo) && is_usable(s.wi), "{} {wo:?} {s:?}", case.name);
                                 assert!(s.f.is_finite() && s.f.min_component() >= 0.0, "{} {s:?}", case.name);
                                 assert!(s.pdf > 0.0 && s.pdf.is_finite() && s.eta > 0.0, "{} {s:?}", case.name);
                                 assert!(which == Sides::All || which.reflection() == s.lobe.is_reflective());

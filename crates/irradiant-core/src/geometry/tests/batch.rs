@@ -70,7 +70,7 @@ fn some_rays(g: &Geometry, n: usize, rng: &mut Rng) -> (Vec<Ray>, Vec<f32>) {
 fn batches_meet_what_single_rays_meet() {
     let mut g = everything();
     let textures = Checks::default();
-    for level in bvh::Level::available() {
+    for level in Level::available() {
         g.set_level(level);
         let mut rng = Rng::new(31);
         let (mut hits, mut blocked, mut instanced) = (0, 0, 0);

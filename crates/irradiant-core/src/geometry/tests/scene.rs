@@ -118,7 +118,7 @@ fn every_level_gives_the_same_bits() {
             .collect::<Vec<_>>()
     };
     let best = run(&g);
-    for level in bvh::Level::available() {
+    for level in Level::available() {
         g.set_level(level);
         assert!(run(&g) == best, "{level:?}");
     }
