@@ -85,7 +85,7 @@ pub(crate) mod x86 {
     use crate::level::Level;
     use crate::node::Bvh;
     use crate::ray::{Closest, Leaves};
-    use crate::traverse::{packet, walk};
+    use crate::traverse::{WIDER, packet, walk};
 
     /// One 256-bit register. Made only by the entry points below, on machines with AVX2.
     #[derive(Clone, Copy)]
@@ -185,7 +185,7 @@ pub(crate) mod x86 {
     fn prepare_fused(ray: &Ray) -> Fused {
         let (o, d) = ray.lanes::<Sse>();
         let inverse = Sse::splat(1.0) / d;
-        let padded = inverse * Sse::splat(PADDING);
+        let padded = inverse * Sse::splat(WIDER);
         let (product, padded_product, lost) = (o * inverse, o * padded, Sse::splat(FUSED_LOST));
         let entering = product.abs() * Sse::splat(-FUSED_LOST) - product;
         let leaving = padded_product.abs() * lost - padded_product;

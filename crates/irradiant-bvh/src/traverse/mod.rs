@@ -1,9 +1,28 @@
 //! From a ray to what it meets, at any [`Level`].
 //!
-//! Box tests never miss a box that the specification enters, though they may enter more, so every level and every packet
-//! finds the same hits, whatever way it takes through the tree. Distances at which a box is left are
-//! scaled up by `PADDING`, which covers the rounding of the slab test (Ize 2013) and that of the shear in the
-//! triangle test.
+//! Every level and every packet finds the same hits, whatever way it takes through the tree and whichever boxes it looks at
+//! besides, because a hit depends on the ray and the triangle alone. The triangle test's `t` has an error that grows with
+//! the triangle's size, so `t` may lie before the box, or the ray miss the box that the test says it meets. Therefore
+//! a candidate counts only if the ray enters the triangle's own box, and its distance is `max(t, near)` where `near`
+//! is the place of that entry; both by the arithmetic of [`scalar`], without fused operations (`within_own_box`).
+//!
+//! Then no kernel can cull what counts, `near <= leave` and `near <= t < limit`. A box higher up contains this one, and:
+//! - The specification, `Halves` and `Whole` do the same operations, of which each is monotonic: `near` of the higher box
+//!   is not greater, `leave` not less (a NaN bounds nothing, and stands where a plane of the own box goes through the
+//!   origin: the other is then at minus infinity where entered, plus infinity where left, or NaN), and
+//!   `near <= t < limit <= limit * PADDING`. `limit` only shrinks, to the `t` of the hit.
+//! - With `x = (plane - o) / d` and `e = 2^-24`, what those compute is `x` within `2 e |x|` where entered and `x PADDING`
+//!   within `3 e |x|` where left, and has its sign. The fused form (of [`boxes`] and of rays in a [`packet`]) takes off more than it may have
+//!   lost of the product with the origin (`FUSED_LOST`), so what is left is rounding relative to `x`: at most `x (1 + 2 e)`
+//!   where entered, at least `x WIDER (1 - 3 e)` where left, lanes without a fused operation included. So `near` is at most
+//!   `5 e` too far, less than `PADDING` (`16 e`) allows against the limit; and against `leave`, which has `WIDER` (`32 e`) where
+//!   the own box has `PADDING`: `16 e` for the `11 e` that both sides' roundings are.
+//! - The interval of a packet does the operations of the specification where entered, on ends of the interval:
+//!   monotonic. Where left it multiplies by the padding in another order: `WIDER` again, `16 e` for `6 e`.
+//! - What waits on a stack is dropped if its `near` is beyond `limit * PADDING`: as above.
+//!
+//! All that holds where distances and products are normal numbers, not below `2^-120`. It holds of user primitives as far
+//! as what their callbacks say lies within their boxes by the same arithmetic.
 
 mod batch;
 mod boxes;
@@ -14,15 +33,20 @@ mod walk;
 #[cfg(test)]
 mod batch_tests;
 #[cfg(test)]
+mod large_tests;
+#[cfg(test)]
 mod tests;
 
 use crate::lanes::{Lanes, Native};
 use crate::level::Level;
 use crate::node::Bvh;
 use crate::ray::{Closest, Leaves, Ray};
+use crate::triangle::Candidate;
 
 /// `1 + 8 ulp`. Ize's bound for the slab test alone is `1 + 2 gamma(3)`, about 1.0000004.
 pub(crate) const PADDING: f32 = 1.000_000_95;
+/// `1 + 16 ulp`: the padding of box tests that do other arithmetic than the specification's.
+pub(crate) const WIDER: f32 = 1.000_001_9;
 
 impl Bvh {
     /// The closest hit of `ray`, or `None`.
@@ -102,10 +126,19 @@ impl<U: Copy> Best<U> {
     }
 
     #[inline(always)]
-    fn offer_triangle<L: Leaves>(&mut self, leaves: &L, ray: &Ray, id: u32, t: f32, u: f32, v: f32) {
+    fn offer_triangle<L: Leaves>(
+        &mut self,
+        leaves: &L,
+        ray: &Ray,
+        id: u32,
+        Candidate { t, u, v }: Candidate,
+        vertices: impl FnOnce() -> [[f32; 3]; 3],
+    ) {
         use crate::node::Block;
         let index = id & Block::INDEX;
         if self.is_beaten_by(t, index)
+            && let Some(t) = scalar::within_own_box(t, &vertices(), ray)
+            && self.is_beaten_by(t, index)
             && (!L::HAS_FILTER || id & Block::FILTERED == 0 || leaves.accept(index, ray, t, u, v))
         {
             (self.t, self.rank, self.u, self.v, self.found) = (t, index, u, v, true);

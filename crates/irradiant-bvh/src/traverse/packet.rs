@@ -10,7 +10,7 @@
 use super::boxes::{BoxTest, FUSED_LIMIT, FUSED_LOST};
 use super::scalar::counts;
 use super::walk::{self, Stack};
-use super::{Best, PADDING};
+use super::{Best, PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
@@ -159,7 +159,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
             };
         }
 
-        let (padding, lost) = (E::splat(PADDING), E::splat(FUSED_LOST));
+        let (padding, lost) = (E::splat(WIDER), E::splat(FUSED_LOST));
         let (zero, minus) = (E::splat(0.0), E::splat(-1.0));
         let (mut entering, mut padded, mut leaving) = ([zero; 3], [zero; 3], [zero; 3]);
         for k in 0..3 {
@@ -192,7 +192,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         let splat = <B::Eight as Lanes>::splat;
         let plane = |k: usize| <B::Eight as Lanes>::load(&node.planes[k]);
         let (mut near, mut far) = (splat(0.0), splat(far * PADDING));
-        let padding = splat(PADDING);
+        let padding = splat(WIDER);
         for (axis, i) in self.intervals.iter().enumerate() {
             if i.first == Interval::<E>::BOTH {
                 // A box ahead is met by rays that go forwards, one behind by those that go backwards; how long they stay
@@ -257,7 +257,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         Some(found)
     }
 
-    /// Calls `hit` with ray, primitive and place for all that the rays of `active` meet in a leaf before `t`, which `hit`
+    /// Calls `hit` with ray, triangle (block and lane) and place for all that the rays of `active` meet in a leaf before `t`, which `hit`
     /// may shorten.
     #[inline(always)]
     fn leaf(
@@ -266,7 +266,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         leaf: Child,
         active: u32,
         t: &mut Column,
-        mut hit: impl FnMut(usize, u32, Candidate) -> f32,
+        mut hit: impl FnMut(usize, &Block, usize, Candidate) -> f32,
     ) {
         for index in leaf.index().. {
             let block = &bvh.blocks[index];
@@ -277,7 +277,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
                     let Some(found) = self.meet(axes, block, lane, t) else { continue };
                     each(found.mask & active, |i| {
                         let candidate = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
-                        t.0[i] = hit(i, block.id(lane), candidate);
+                        t.0[i] = hit(i, block, lane, candidate);
                     });
                 }
             } else {
@@ -286,7 +286,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
                     let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, t.0[ray]) else { return };
                     each(found.mask, |lane| {
                         let candidate = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
-                        t.0[ray] = hit(ray, block.id(lane), candidate);
+                        t.0[ray] = hit(ray, block, lane, candidate);
                     });
                 });
             }
@@ -444,8 +444,8 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 }
             }
         } else {
-            packet.leaf(bvh, entry.child, active, &mut t, |i, id, at| {
-                best[i].offer_triangle(leaves, &rays[i], id, at.t, at.u, at.v);
+            packet.leaf(bvh, entry.child, active, &mut t, |i, block, lane, at| {
+                best[i].offer_triangle(leaves, &rays[i], block.id(lane), at, || block.triangle(lane));
                 best[i].t
             });
         }
@@ -504,8 +504,8 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 }
             }
         } else {
-            packet.leaf(bvh, entry.child, active, &mut t, |i, id, at| {
-                let is_hit = at.t < rays[i].t_max && counts(leaves, &rays[i], id, at);
+            packet.leaf(bvh, entry.child, active, &mut t, |i, block, lane, at| {
+                let is_hit = counts(leaves, &rays[i], block, lane, at);
                 blocked |= u32::from(is_hit) << i;
                 if is_hit || blocked >> i & 1 != 0 { f32::NEG_INFINITY } else { rays[i].t_max }
             });

@@ -5,19 +5,41 @@ use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Shear};
 
-/// Distance at which the ray enters child `i`, if it does before `far`.
-fn enter(node: &Node, i: usize, ray: &Ray, far: f32) -> Option<f32> {
+/// Distance at which the ray enters a box, if it does before `far`; `planes` are `[2 axis + side]`.
+#[inline(always)]
+fn enter_box(planes: &[f32; 6], ray: &Ray, far: f32) -> Option<f32> {
     let (mut near, mut far) = (0.0, far * PADDING);
     for axis in 0..3 {
         let inverse = 1.0 / ray.d[axis];
         let side = usize::from(inverse.is_sign_negative());
-        let enters = (node.planes[2 * axis + side][i] - ray.o[axis]) * inverse;
-        let leaves = (node.planes[2 * axis + 1 - side][i] - ray.o[axis]) * (inverse * PADDING);
+        let enters = (planes[2 * axis + side] - ray.o[axis]) * inverse;
+        let leaves = (planes[2 * axis + 1 - side] - ray.o[axis]) * (inverse * PADDING);
         // A ray inside a plane (0 times infinity, NaN) is bounded by neither side of that slab.
         near = if enters > near { enters } else { near };
         far = if leaves < far { leaves } else { far };
     }
     (near <= far).then_some(near)
+}
+
+/// The same for child `i`.
+fn enter(node: &Node, i: usize, ray: &Ray, far: f32) -> Option<f32> {
+    enter_box(&node.planes.map(|plane| plane[i]), ray, far)
+}
+
+/// What becomes of a candidate with `t` when the triangle's own box is asked, see [`super`]: it does not count if the ray
+/// misses that box, and it is not nearer than the box.
+#[inline(always)]
+pub(super) fn within_own_box(t: f32, vertices: &[[f32; 3]; 3], ray: &Ray) -> Option<f32> {
+    let [a, b, c] = vertices;
+    let mut planes = [0.0; 6];
+    for axis in 0..3 {
+        let (a, b, c) = (a[axis], b[axis], c[axis]);
+        let (low, high) = if a < b { (a, b) } else { (b, a) };
+        planes[2 * axis] = if c < low { c } else { low };
+        planes[2 * axis + 1] = if c > high { c } else { high };
+    }
+    let near = enter_box(&planes, ray, f32::INFINITY)?;
+    Some(if near > t { near } else { t })
 }
 
 /// The children that the ray enters before `far`, farthest first.
@@ -68,7 +90,7 @@ pub(super) fn closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Clo
                 let block = &bvh.blocks[index];
                 for i in 0..block.count() {
                     if let Some(hit) = triangle::intersect(&block.triangle(i), &shear) {
-                        best.offer_triangle(leaves, ray, block.id(i), hit.t, hit.u, hit.v);
+                        best.offer_triangle(leaves, ray, block.id(i), hit, || block.triangle(i));
                     }
                 }
                 if block.is_last() {
@@ -113,8 +135,7 @@ pub(super) fn any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
                 let block = &bvh.blocks[index];
                 for i in 0..block.count() {
                     if let Some(hit) = triangle::intersect(&block.triangle(i), &shear)
-                        && hit.t < ray.t_max
-                        && counts(leaves, ray, block.id(i), hit)
+                        && counts(leaves, ray, block, i, hit)
                     {
                         return true;
                     }
@@ -129,8 +150,16 @@ pub(super) fn any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
     false
 }
 
-/// Whether the filter lets a hit through.
+/// Whether a candidate is a hit before the ray's end that the filter lets through.
 #[inline(always)]
-pub(super) fn counts<L: Leaves>(leaves: &L, ray: &Ray, id: u32, hit: triangle::Candidate) -> bool {
-    !L::HAS_FILTER || id & Block::FILTERED == 0 || leaves.accept(id & Block::INDEX, ray, hit.t, hit.u, hit.v)
+pub(super) fn counts<L: Leaves>(leaves: &L, ray: &Ray, block: &Block, lane: usize, hit: triangle::Candidate) -> bool {
+    if hit.t < ray.t_max
+        && let Some(t) = within_own_box(hit.t, &block.triangle(lane), ray)
+        && t < ray.t_max
+    {
+        let id = block.id(lane);
+        !L::HAS_FILTER || id & Block::FILTERED == 0 || leaves.accept(id & Block::INDEX, ray, t, hit.u, hit.v)
+    } else {
+        false
+    }
 }

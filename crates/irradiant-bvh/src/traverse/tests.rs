@@ -58,13 +58,13 @@ impl Soup {
         bvh
     }
     /// The triangles worth testing one by one.
-    fn usable(&self) -> Vec<(u32, [[f32; 3]; 3])> {
+    pub fn usable(&self) -> Vec<(u32, [[f32; 3]; 3])> {
         let corners = self.triangles.iter().map(|t| t.map(|i| self.positions[i as usize]));
         (0..).zip(corners).filter(|(_, c)| c.iter().flatten().all(|x| x.is_finite())).collect()
     }
 }
 
-fn brute_force(triangles: &[(u32, [[f32; 3]; 3])], ray: &Ray) -> Option<Hit> {
+pub(super) fn brute_force(triangles: &[(u32, [[f32; 3]; 3])], ray: &Ray) -> Option<Hit> {
     if !is_proper(ray) {
         return None;
     }
@@ -73,7 +73,7 @@ fn brute_force(triangles: &[(u32, [[f32; 3]; 3])], ray: &Ray) -> Option<Hit> {
     for (id, corners) in triangles {
         // What has no area was dropped at build time.
         if let Some(hit) = triangle::intersect(corners, &shear) {
-            best.offer_triangle(&TrianglesOnly, ray, *id, hit.t, hit.u, hit.v);
+            best.offer_triangle(&TrianglesOnly, ray, *id, hit, || *corners);
         }
     }
     match best.finish() {
@@ -82,11 +82,11 @@ fn brute_force(triangles: &[(u32, [[f32; 3]; 3])], ray: &Ray) -> Option<Hit> {
     }
 }
 
-fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
+pub(super) fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
     hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive])
 }
 
-fn triangle_hit<U>(closest: Option<Closest<U>>) -> Option<Hit> {
+pub(super) fn triangle_hit<U>(closest: Option<Closest<U>>) -> Option<Hit> {
     match closest {
         Some(Closest::Triangle(hit)) => Some(hit),
         _ => None,
@@ -401,7 +401,7 @@ fn users_and_filtered_triangles_mix_in_one_tree() {
         for (id, corners) in &triangles {
             let id = id | if *id >= 100 { crate::node::Block::FILTERED } else { 0 };
             if let Some(hit) = triangle::intersect(corners, &Shear::new(&ray)) {
-                best.offer_triangle(&balls, &ray, id, hit.t, hit.u, hit.v);
+                best.offer_triangle(&balls, &ray, id, hit, || *corners);
             }
         }
         for user in 0..60 {

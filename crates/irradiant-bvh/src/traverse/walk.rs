@@ -207,7 +207,8 @@ pub(super) fn closest_below<B: BoxTest, L: Leaves>(
                     while hits.mask != 0 {
                         let i = hits.mask.trailing_zeros() as usize & 7;
                         hits.mask &= hits.mask - 1;
-                        best.offer_triangle(leaves, ray, block.id(i), hits.t[i], hits.u[i], hits.v[i]);
+                        let hit = Candidate { t: hits.t[i], u: hits.u[i], v: hits.v[i] };
+                        best.offer_triangle(leaves, ray, block.id(i), hit, || block.triangle(i));
                     }
                 }
                 if block.is_last() {
@@ -303,7 +304,7 @@ pub(super) fn any_below<B: BoxTest, L: Leaves>(bvh: &Bvh, mut child: Child, ray:
                         let i = hits.mask.trailing_zeros() as usize & 7;
                         hits.mask &= hits.mask - 1;
                         let hit = Candidate { t: hits.t[i], u: hits.u[i], v: hits.v[i] };
-                        if hit.t < ray.t_max && counts(leaves, ray, block.id(i), hit) {
+                        if counts(leaves, ray, block, i, hit) {
                             return true;
                         }
                     }
