@@ -1,7 +1,7 @@
 //! Large triangles, whose `t` has an error beyond any padding of boxes: every kernel against brute force, to the bit.
 //!
-//! Exact: seeds are fixed, false alarms are impossible. Seen to fail when broken: no question about the own box (432 of the answers for
-//! 960,000 rays, all kernels together, and the real ray at once).
+//! Exact: seeds are fixed, false alarms are impossible. Seen to fail when broken: no question about the own box (432 of the
+//! answers for 960,000 rays, all kernels together, and the real ray at once).
 
 use super::tests::{Random, Soup, bits, brute_force, random_soup, triangle_hit};
 use super::*;

@@ -1,6 +1,7 @@
 //! The specification: one child and one triangle at a time, in plain Rust.
 
 use super::{Best, PADDING, is_proper};
+use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Shear};
@@ -27,19 +28,55 @@ fn enter(node: &Node, i: usize, ray: &Ray, far: f32) -> Option<f32> {
 }
 
 /// What becomes of a candidate with `t` when the triangle's own box is asked, see [`super`]: it does not count if the ray
-/// misses that box, and it is not nearer than the box.
+/// misses that box, and it is not nearer than the box. The operations of [`enter_box`], three axes at a time.
 #[inline(always)]
 pub(super) fn within_own_box(t: f32, vertices: &[[f32; 3]; 3], ray: &Ray) -> Option<f32> {
-    let [a, b, c] = vertices;
-    let mut planes = [0.0; 6];
+    let [a, b, c] = vertices.map(|[x, y, z]| Native::load(&[x, y, z, 0.0]));
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let (o, d) = ray.lanes::<Native>();
+    let (inverse, zero) = (Native::splat(1.0) / d, Native::splat(0.0));
+    // Of a proper ray no reciprocal is zero or NaN.
+    let (forwards, backwards) = (zero.lt(inverse), inverse.lt(zero));
+    let first = (low & forwards) | (high & backwards);
+    let last = (high & forwards) | (low & backwards);
+    let enters = ((first - o) * inverse).to_array();
+    let leaves = ((last - o) * (inverse * Native::splat(PADDING))).to_array();
+    let (mut near, mut far) = (0.0, f32::INFINITY);
     for axis in 0..3 {
-        let (a, b, c) = (a[axis], b[axis], c[axis]);
-        let (low, high) = if a < b { (a, b) } else { (b, a) };
-        planes[2 * axis] = if c < low { c } else { low };
-        planes[2 * axis + 1] = if c > high { c } else { high };
+        near = if enters[axis] > near { enters[axis] } else { near };
+        far = if leaves[axis] < far { leaves[axis] } else { far };
     }
-    let near = enter_box(&planes, ray, f32::INFINITY)?;
-    Some(if near > t { near } else { t })
+    (near <= far).then_some(if near > t { near } else { t })
+}
+
+#[cfg(test)]
+#[test]
+fn own_boxes_are_entered_as_others_are() {
+    use super::tests::Random;
+    let mut random = Random(51);
+    let mut entered = 0;
+    for _ in 0..200_000 {
+        let number = |random: &mut Random| match random.below(8) {
+            0 => 0.0,
+            1 => -0.0,
+            2 => 0.5,
+            3 => random.signed() * 1e38,
+            4 => random.signed() * 1e-38,
+            _ => random.signed(),
+        };
+        let mut point = || [(); 3].map(|()| number(&mut random));
+        let (o, d, vertices) = (point(), point(), [point(), point(), point()]);
+        let ray = Ray { o, t_max: f32::INFINITY, d, time: 0.0 };
+        if !is_proper(&ray) {
+            continue;
+        }
+        let of = |k: usize, f: fn(f32, f32) -> f32| f(f(vertices[0][k], vertices[1][k]), vertices[2][k]);
+        let planes = std::array::from_fn(|p| of(p / 2, if p % 2 == 0 { f32::min } else { f32::max }));
+        let expected = enter_box(&planes, &ray, f32::INFINITY).map(|near| near.max(1e-3).to_bits());
+        assert_eq!(within_own_box(1e-3, &vertices, &ray).map(f32::to_bits), expected, "{ray:?} {vertices:?}");
+        entered += usize::from(expected.is_some());
+    }
+    assert!(entered > 10_000, "{entered}");
 }
 
 /// The children that the ray enters before `far`, farthest first.
