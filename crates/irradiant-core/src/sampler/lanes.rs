@@ -23,16 +23,17 @@ impl StreamLanes {
     /// Of nothing yet.
     pub const NONE: Self = Self { reversed_index: [0; LANES], seed: [0; LANES] };
 
-    /// Sets a lane; false for samplers that cannot be drawn from side by side.
+    /// Whether a stream can be drawn from side by side with others.
+    pub fn can_hold(stream: &SampleStream) -> bool {
+        padded_owen(stream).is_some()
+    }
+
+    /// Sets a lane, if it [can hold](Self::can_hold) the stream.
     #[inline]
-    pub fn set(&mut self, i: usize, stream: &SampleStream) -> bool {
-        let Source::Padded { reversed_index, seed, randomization: Randomization::FastOwen | Randomization::Owen } =
-            stream.source
-        else {
-            return false;
-        };
-        (self.reversed_index[i], self.seed[i]) = (reversed_index, seed);
-        true
+    pub fn set(&mut self, i: usize, stream: &SampleStream) {
+        if let Some((reversed_index, seed)) = padded_owen(stream) {
+            (self.reversed_index[i], self.seed[i]) = (reversed_index, seed);
+        }
     }
 
     /// Lane `from` goes to lane `to`.
@@ -56,6 +57,17 @@ impl StreamLanes {
     #[inline(always)]
     fn block(&self, n: usize, block: u32, out: &mut BlockLanes) {
         owen_sobol_4d_lanes(n, &self.reversed_index, &self.seed, block, &mut out.0);
+    }
+}
+
+/// Reversed index and seed of a padded, Owen-scrambled Sobol sequence.
+#[inline]
+fn padded_owen(stream: &SampleStream) -> Option<(u32, u32)> {
+    match stream.source {
+        Source::Padded { reversed_index, seed, randomization: Randomization::FastOwen | Randomization::Owen } => {
+            Some((reversed_index, seed))
+        }
+        _ => None,
     }
 }
 

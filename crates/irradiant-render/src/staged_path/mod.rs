@@ -39,11 +39,10 @@ use std::f32::consts::FRAC_1_PI;
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
     pub(crate) fn has_stages(&self, scene: &Scene) -> bool {
-        let mut streams = StreamLanes::NONE;
         self.light_splits == 1
             && !self.regularize
             && scene.layers.channels() == 0
-            && streams.set(0, &scene.sampler.stream([0, 0], 0))
+            && StreamLanes::can_hold(&scene.sampler.stream([0, 0], 0))
     }
 
     /// What the camera rays of some samples see, whose first hits are known: into `radiance`, all zero before.
@@ -355,7 +354,8 @@ impl PathIntegrator {
         b.shadow_ends.clear();
         b.shadow_light.clear();
         for i in 0..n {
-            if !(b.pmf[i] > 0.0 && b.targets.pdf[i] > 0.0) {
+            // Not a comparison that NaN fails: what is wrong must reach the film, which counts it.
+            if b.pmf[i] == 0.0 || b.targets.pdf[i] == 0.0 {
                 continue;
             }
             let (f, factor) = match b.scattering[i] {
