@@ -77,7 +77,7 @@ impl Level {
         #[cfg(target_arch = "x86_64")]
         {
             let level = self.min(Self::detect());
-            if level == Self::Avx512 && wide::is_available() {
+            if level == Self::Avx512 && is_x86_feature_detected!("avx512bw") {
                 return wide::run_avx512(kernel);
             }
             if level >= Self::Avx2 {
@@ -92,13 +92,7 @@ impl Level {
 mod wide {
     use super::{Kernel, Level};
 
-    /// Whether the machine has what 512-bit arithmetic on integers and masks takes, beyond [`Level::Avx512`].
-    #[inline]
-    pub fn is_available() -> bool {
-        is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512bw")
-    }
-
-    /// To be called where [`is_available`] at [`Level::Avx512`].
+    /// To be called at [`Level::Avx512`] on machines that have AVX-512 BW besides.
     #[inline]
     #[allow(unsafe_code)]
     pub fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
@@ -106,7 +100,7 @@ mod wide {
         fn compiled<K: Kernel>(kernel: K) -> K::Output {
             kernel.run()
         }
-        debug_assert!(is_available() && Level::detect() == Level::Avx512);
+        debug_assert!(Level::detect() == Level::Avx512);
         // SAFETY: the one caller, `Level::run`, has just asked for these features. Guarded by `kernels_run_at_every_level`.
         unsafe { compiled(kernel) }
     }
