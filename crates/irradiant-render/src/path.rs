@@ -1,9 +1,12 @@
 //! Path tracing with multiple importance sampling: the production estimator.
 //!
-//! L = sum over i of K^i(Le), one path at a time: at each vertex a light sample (at the first one several, if asked for) and one BSDF sample, combined by the
+//! L = sum over i of K^i(Le): at each vertex a light sample (at the first one several, if asked for) and one BSDF sample, combined by the
 //! power heuristic (Veach and Guibas 1995), ended by Russian roulette on the throughput. Wavelengths: the four of a path
 //! share one set of decisions whose densities do not depend on wavelength, so that no wavelength weighting is needed;
 //! a dispersive vertex ends the secondary ones.
+//!
+//! Here is one path at a time, which is the specification and what recorders see; plain pictures go by the
+//! stages of `staged_path`, the same bits.
 
 use crate::camera_samples::{CameraSample, for_each_batch, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
