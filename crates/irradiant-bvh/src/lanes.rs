@@ -34,6 +34,10 @@ pub(crate) trait Lanes:
     fn le(self, b: Self) -> Self;
     /// Bit `i` is the sign bit of lane `i`.
     fn mask(self) -> u32;
+    /// Lane `i` is that of `a` where bit `i` of `mask` is set, else that of `b`.
+    fn select(mask: u32, a: Self, b: Self) -> Self;
+    /// Lane `i` is the number of a table in the row named by bits 3 and 4 of lane `i` of `rows` (whose other bits are zero), and the column.
+    fn look_up(table: &[[f32; 8]; 3], rows: Self, column: usize) -> Self;
 }
 
 /// Eight lanes.
@@ -136,6 +140,14 @@ impl Lanes for Portable {
     fn mask(self) -> u32 {
         (0..4).map(|i| (self.0[i].to_bits() >> 31) << i).sum()
     }
+    #[inline(always)]
+    fn select(mask: u32, a: Self, b: Self) -> Self {
+        Self(std::array::from_fn(|i| if mask >> i & 1 != 0 { a.0[i] } else { b.0[i] }))
+    }
+    #[inline(always)]
+    fn look_up(table: &[[f32; 8]; 3], rows: Self, column: usize) -> Self {
+        Self(rows.0.map(|row| table[(row.to_bits() >> 3) as usize][column]))
+    }
 }
 
 macro_rules! doubled_operator {
@@ -211,6 +223,14 @@ macro_rules! doubled {
             #[inline(always)]
             fn mask(self) -> u32 {
                 self.0.mask() | self.1.mask() << $half
+            }
+            #[inline(always)]
+            fn select(mask: u32, a: Self, b: Self) -> Self {
+                Self(F::select(mask, a.0, b.0), F::select(mask >> $half, a.1, b.1))
+            }
+            #[inline(always)]
+            fn look_up(table: &[[f32; 8]; 3], rows: Self, column: usize) -> Self {
+                Self(F::look_up(table, rows.0, column), F::look_up(table, rows.1, column))
             }
         }
     };
@@ -347,6 +367,20 @@ mod sse {
         fn mask(self) -> u32 {
             baseline!(_mm_movemask_ps(self.0)) as u32
         }
+        #[inline(always)]
+        fn select(mask: u32, a: Self, b: Self) -> Self {
+            let bits = baseline!(_mm_setr_epi32(1, 2, 4, 8));
+            let chosen = baseline!(_mm_cmpeq_epi32(_mm_and_si128(_mm_set1_epi32(mask as i32), bits), bits));
+            let chosen = baseline!(_mm_castsi128_ps(chosen));
+            Self(baseline!(_mm_or_ps(_mm_and_ps(chosen, a.0), _mm_andnot_ps(chosen, b.0))))
+        }
+        #[inline(always)]
+        fn look_up([x, y, z]: &[[f32; 8]; 3], rows: Self, column: usize) -> Self {
+            let rows = baseline!(_mm_castps_si128(rows.0));
+            let is = |row: i32| baseline!(_mm_castsi128_ps(_mm_cmpeq_epi32(rows, _mm_set1_epi32(row << 3))));
+            let of = |axis: &[f32; 8], row: i32| baseline!(_mm_and_ps(is(row), _mm_set1_ps(axis[column])));
+            Self(baseline!(_mm_or_ps(of(x, 0), _mm_or_ps(of(y, 1), of(z, 2)))))
+        }
     }
 }
 
@@ -446,6 +480,19 @@ mod avx {
         fn mask(self) -> u32 {
             u32::from(avx!(_mm512_movepi32_mask(_mm512_castps_si512(self.0))))
         }
+        #[inline(always)]
+        fn select(mask: u32, a: Self, b: Self) -> Self {
+            Self(avx!(_mm512_mask_blend_ps(mask as u16, b.0, a.0)))
+        }
+        #[inline(always)]
+        fn look_up(table: &[[f32; 8]; 3], rows: Self, column: usize) -> Self {
+            let [x, y, z] = table;
+            let index = avx!(_mm512_add_epi32(_mm512_castps_si512(rows.0), _mm512_set1_epi32(column as i32)));
+            let (low, high) = avx!((_mm512_castps256_ps512(_mm256_loadu_ps(x.as_ptr())), _mm256_loadu_ps(y.as_ptr())));
+            let both = avx!(_mm512_insertf32x8::<1>(low, high));
+            let last = avx!(_mm512_castps256_ps512(_mm256_loadu_ps(z.as_ptr())));
+            Self(avx!(_mm512_permutex2var_ps(both, index, last)))
+        }
     }
 
     impl Lanes for Avx {
@@ -492,6 +539,20 @@ mod avx {
         #[inline(always)]
         fn mask(self) -> u32 {
             avx!(_mm256_movemask_ps(self.0)) as u32
+        }
+        #[inline(always)]
+        fn select(mask: u32, a: Self, b: Self) -> Self {
+            let bits = avx!(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128));
+            let chosen = avx!(_mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits));
+            Self(avx!(_mm256_blendv_ps(b.0, a.0, _mm256_castsi256_ps(chosen))))
+        }
+        #[inline(always)]
+        fn look_up([x, y, z]: &[[f32; 8]; 3], rows: Self, column: usize) -> Self {
+            let rows = avx!(_mm256_castps_si256(rows.0));
+            let is_x = avx!(_mm256_castsi256_ps(_mm256_cmpeq_epi32(rows, _mm256_setzero_si256())));
+            let is_y = avx!(_mm256_castsi256_ps(_mm256_cmpeq_epi32(rows, _mm256_set1_epi32(8))));
+            let [x, y, z] = avx!([_mm256_set1_ps(x[column]), _mm256_set1_ps(y[column]), _mm256_set1_ps(z[column])]);
+            Self(avx!(_mm256_blendv_ps(_mm256_blendv_ps(z, y, is_y), x, is_x)))
         }
     }
 
@@ -613,6 +674,8 @@ mod tests {
             F::splat(a.mask() as f32),
             F::splat((a.lt(b) & b.le(a.abs()) | a.le(b)).mask() as f32),
             F::splat(2.0).multiply_add(F::splat(3.0), F::splat(0.5)),
+            F::select(a.lt(b).mask(), a, b),
+            F::select(0x5a37 & F::ALL, a, b),
         ];
         results.iter().map(|r| r.to_array()).collect()
     }

@@ -149,9 +149,12 @@ impl Block {
     }
 
     /// The corners of the triangle in a lane.
-    #[inline]
+    #[inline(always)]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
-        [0, 1, 2].map(|c| self.vertices.map(|axis| axis[self.corner(lane, c)]))
+        // Written out: `map` of arrays is a call, or copies them.
+        let [x, y, z] = &self.vertices;
+        let (a, b, c) = (self.corner(lane, 0), self.corner(lane, 1), self.corner(lane, 2));
+        [[x[a], y[a], z[a]], [x[b], y[b], z[b]], [x[c], y[c], z[c]]]
     }
 }
 

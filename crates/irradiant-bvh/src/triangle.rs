@@ -163,7 +163,7 @@ pub(crate) fn intersect_block<E: Eight>(block: &Block, shear: &Shear, t_far: f32
     let z = E::load(&block.vertices[kz]) - oz;
     let x = (E::load(&block.vertices[kx]) - ox) + sx * z;
     let y = (E::load(&block.vertices[ky]) - oy) + sy * z;
-    let (mut found, strange) = intersect_sheared(E::choose([x, y, z], block.corners), sz, E::splat(t_far))?;
+    let (mut found, strange) = intersect_sheared(E::choose([x, y, z], block.corners), sz, E::splat(t_far), E::ALL)?;
     if strange != 0 {
         again_in_double(block, shear, t_far, strange, &mut found);
     }
@@ -171,19 +171,20 @@ pub(crate) fn intersect_block<E: Eight>(block: &Block, shear: &Shear, t_far: f32
 }
 
 /// One triangle or one ray in each lane; `vertices` and `origin` along the axes of the [`Shear`]. Candidates with
-/// `t <= t_far`, bit for bit those of [`intersect`], and a mask of lanes that must be asked with that one.
+/// `t <= t_far` among `lanes`, bit for bit those of [`intersect`], and a mask of lanes that must be asked with that one.
 #[inline(always)]
 pub(crate) fn intersect_lanes<F: Lanes>(
     vertices: [[F; 3]; 3],
     [ox, oy, oz]: [F; 3],
     [sx, sy, sz]: [F; 3],
     t_far: F,
+    lanes: u32,
 ) -> Option<(Candidates<F>, u32)> {
     let [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]] = vertices;
     let (z0, z1, z2) = (z0 - oz, z1 - oz, z2 - oz);
     let (x0, x1, x2) = ((x0 - ox) + sx * z0, (x1 - ox) + sx * z1, (x2 - ox) + sx * z2);
     let (y0, y1, y2) = ((y0 - oy) + sy * z0, (y1 - oy) + sy * z1, (y2 - oy) + sy * z2);
-    intersect_sheared([[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]], sz, t_far)
+    intersect_sheared([[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]], sz, t_far, lanes)
 }
 
 /// The same from the sheared vertices on.
@@ -192,6 +193,7 @@ fn intersect_sheared<F: Lanes>(
     [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]]: [[F; 3]; 3],
     sz: F,
     t_far: F,
+    lanes: u32,
 ) -> Option<(Candidates<F>, u32)> {
     let e0 = x1 * y2 - y1 * x2;
     let e1 = x2 * y0 - y2 * x0;
@@ -200,7 +202,7 @@ fn intersect_sheared<F: Lanes>(
     let zero = F::splat(0.0);
     let lowest = e0.min(e1).min(e2);
     let highest = e0.max(e1).max(e2);
-    let mut inside = (lowest.lt(zero) & zero.lt(highest)).mask() ^ F::ALL;
+    let mut inside = !(lowest.lt(zero) & zero.lt(highest)).mask() & lanes;
     if inside == 0 {
         return None;
     }

@@ -3,6 +3,7 @@
 #[cfg(target_arch = "x86_64")]
 use super::boxes;
 use super::boxes::Halves;
+use super::crowd;
 use super::packet::{self, PACKET};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::Sse;
@@ -14,7 +15,8 @@ use crate::ray::{Closest, Leaves, Ray};
 impl Bvh {
     /// For each ray what [`intersect`](Self::intersect) gives, to the bit; `out[i]` is the answer for `rays[i]`.
     ///
-    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together.
+    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together, or the tree is small and
+    /// there are many.
     ///
     /// # Panics
     /// If `rays` and `out` differ in length.
@@ -41,13 +43,29 @@ impl Bvh {
                 packet::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out)
             }
         };
+        let crowd = |rays: &[Ray], which: &[u16], octant: usize, out: &mut [Option<Closest<L::UserHit>>]| match level {
+            Level::Neon | Level::Scalar => {
+                crowd::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
+            }
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => crowd::closest::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, which, octant, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => boxes::x86::closest_crowd_avx2(self, rays, which, octant, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => boxes::x86::closest_crowd_avx512(self, rays, which, octant, leaves, out),
+            #[cfg(not(target_arch = "x86_64"))]
+            Level::Sse | Level::Avx2 | Level::Avx512 => {
+                crowd::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
+            }
+        };
         let single = |ray: &Ray| self.intersect(level, ray, leaves);
-        in_packets(rays, out, packet, single);
+        in_company(self.sorts_rays(level), rays, out, packet, crowd, single);
     }
 
     /// For each ray what [`occluded`](Self::occluded) says; `out[i]` is the answer for `rays[i]`.
     ///
-    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together.
+    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together, or the tree is small and
+    /// there are many.
     ///
     /// # Panics
     /// If `rays` and `out` differ in length.
@@ -68,29 +86,112 @@ impl Bvh {
                 packet::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out)
             }
         };
+        let crowd = |rays: &[Ray], which: &[u16], octant: usize, out: &mut [bool]| match level {
+            Level::Neon | Level::Scalar => {
+                crowd::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
+            }
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => crowd::any::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, which, octant, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => boxes::x86::any_crowd_avx2(self, rays, which, octant, leaves, out),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => boxes::x86::any_crowd_avx512(self, rays, which, octant, leaves, out),
+            #[cfg(not(target_arch = "x86_64"))]
+            Level::Sse | Level::Avx2 | Level::Avx512 => {
+                crowd::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
+            }
+        };
         let single = |ray: &Ray| self.occluded(level, ray, leaves);
-        in_packets(rays, out, packet, single);
+        in_company(self.sorts_rays(level), rays, out, packet, crowd, single);
+    }
+
+    /// Whether rays that go anywhere are faster in one call than one by one: in a small tree, which sorts them by where they go, some 256
+    /// at a time.
+    pub fn sorts_rays(&self, level: Level) -> bool {
+        level != Level::Scalar && self.nodes.len() <= SMALL
     }
 }
 
-/// Tries packets, then halves of such, then single rays; `packet` says whether it has answered.
+/// Nodes of a tree at most in which rays go in crowds.
+///
+/// Rendering with crowds against without (paths, AVX-512, two Zen 4 cores, CPU time): 1 node 0.86 to 0.90, 2 nodes 0.93, a floor and two spheres 0.92; 136 nodes 1.03,
+/// 910 nodes 0.94, 32,400 nodes 1.06; real scenes of many nodes 0.99 to 1.10. With AVX2 0.92, 0.93; with SSE 0.70, 0.95.
+const SMALL: usize = 8;
+/// Rays of a batch that are sorted together.
+const SORTED: usize = 256;
+/// Crowds of fewer rays are not worth it.
+const LEAST: usize = 4;
+
+/// Tries packets, then halves of such. Others go alone, or in crowds of one octant.
 #[inline(always)]
-fn in_packets<T>(
+fn in_company<T>(
+    crowds: bool,
     rays: &[Ray],
     out: &mut [T],
     mut packet: impl FnMut(&[Ray], &mut [T]) -> bool,
+    mut crowd: impl FnMut(&[Ray], &[u16], usize, &mut [T]),
     single: impl Fn(&Ray) -> T,
 ) {
-    for (rays, out) in rays.chunks(PACKET).zip(out.chunks_mut(PACKET)) {
-        if packet(rays, out) {
-            continue;
-        }
-        for (rays, out) in rays.chunks(PACKET / 2).zip(out.chunks_mut(PACKET / 2)) {
-            if !packet(rays, out) {
-                for (ray, out) in rays.iter().zip(out) {
-                    *out = single(ray);
+    for (rays, out) in rays.chunks(SORTED).zip(out.chunks_mut(SORTED)) {
+        let (mut left, mut n) = ([0; SORTED], 0);
+        for (first, (rays, out)) in (0..).step_by(PACKET).zip(rays.chunks(PACKET).zip(out.chunks_mut(PACKET))) {
+            if packet(rays, out) {
+                continue;
+            }
+            if crowds {
+                for i in first..first + rays.len() {
+                    left[n] = i as u16;
+                    n += 1;
+                }
+                continue;
+            }
+            for (rays, out) in rays.chunks(PACKET / 2).zip(out.chunks_mut(PACKET / 2)) {
+                if !packet(rays, out) {
+                    for (ray, out) in rays.iter().zip(out) {
+                        *out = single(ray);
+                    }
                 }
             }
         }
+        if n > 0 {
+            in_crowds(rays, &left[..n], out, &mut crowd, &single);
+        }
     }
+}
+
+/// The rays of `which`, sorted by where they go.
+#[inline(always)]
+fn in_crowds<T>(
+    rays: &[Ray],
+    which: &[u16],
+    out: &mut [T],
+    crowd: &mut impl FnMut(&[Ray], &[u16], usize, &mut [T]),
+    single: &impl Fn(&Ray) -> T,
+) {
+    let (mut kinds, mut places) = ([0; SORTED], [0; crowd::KINDS + 1]);
+    for (kind, &i) in kinds.iter_mut().zip(which) {
+        *kind = crowd::kind(&rays[i as usize]);
+        places[*kind + 1] += 1;
+    }
+    for kind in 0..crowd::KINDS {
+        places[kind + 1] += places[kind];
+    }
+    let mut sorted = [0; SORTED];
+    for (&kind, &i) in kinds.iter().zip(which) {
+        sorted[places[kind]] = i;
+        places[kind] += 1;
+    }
+    let mut begin = 0;
+    for octant in 0..crowd::OCTANTS {
+        let end = places[crowd::last_kind_of(octant)];
+        for which in sorted[begin..end].chunks(PACKET) {
+            if which.len() >= LEAST {
+                crowd(rays, which, octant, out);
+            } else {
+                which.iter().for_each(|&i| out[i as usize] = single(&rays[i as usize]));
+            }
+        }
+        begin = end;
+    }
+    sorted[begin..which.len()].iter().for_each(|&i| out[i as usize] = single(&rays[i as usize]));
 }

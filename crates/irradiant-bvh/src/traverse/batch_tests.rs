@@ -59,8 +59,8 @@ fn same_as_single<L: Leaves<UserHit: PartialEq + std::fmt::Debug>>(
     let mut random = Random(21);
     let mut hits = 0;
     for batch in 0..n_batches {
-        let n = [0, 1, 2, 7, 8, 9, 16, 17, 33, 64][batch % 10];
-        let rays = rays(&mut random, n);
+        let rays = rays(&mut random, [0, 1, 2, 7, 8, 9, 16, 17, 33, 64][batch % 10]);
+        let n = rays.len();
         let expected: Vec<_> = rays.iter().map(|r| bvh.intersect(Level::Scalar, r, leaves)).collect();
         hits += expected.iter().flatten().count();
         for level in Level::available() {
@@ -142,6 +142,39 @@ fn batches_ask_users_and_filters_as_single_rays_do() {
     let boxes = balls.boxes();
     let bvh = Bvh::build(&BuildInput { meshes: &meshes, user_boxes: &boxes }, &BuildSettings::default());
     same_as_single("users", &bvh, &balls, |random, n| window(&plain, 1.0, n, random), 4000);
+}
+
+/// Trees that [sort](Bvh::sorts_rays) the rays, and many rays that go anywhere.
+#[test]
+fn crowds_meet_what_single_rays_meet() {
+    let soups = [
+        random_soup(5, 1.0, 1.0, 31),
+        random_soup(60, 1.0, 1.0, 32),
+        random_soup(90, 0.3, 1.0, 33),
+        lattice_soup(90, 34),
+    ];
+    for (k, soup) in soups.iter().enumerate() {
+        let bvh = soup.build();
+        assert!(bvh.sorts_rays(Level::Sse), "{k}: {} nodes", bvh.nodes.len());
+        same_as_single(&format!("crowd {k}"), &bvh, &TrianglesOnly, |random, n| anywhere(soup, 4 * n, random), 400);
+    }
+    let (plain, cut) = (random_soup(25, 0.5, 1.0, 35), random_soup(25, 0.7, 1.0, 36));
+    // Points, which are dropped, but counted.
+    let nothing = random_soup(75, 0.0, 1.0, 38);
+    let mut random = Random(37);
+    let balls = Balls((0..6).map(|_| (random.point(), 0.05 + 0.3 * random.unit())).collect());
+    let meshes = [plain.mesh(), nothing.mesh(), Mesh { filtered: true, ..cut.mesh() }];
+    let boxes = balls.boxes();
+    let bvh = Bvh::build(&BuildInput { meshes: &meshes, user_boxes: &boxes }, &BuildSettings::default());
+    assert!(bvh.sorts_rays(Level::Sse));
+    same_as_single("crowd with users", &bvh, &balls, |random, n| anywhere(&plain, 4 * n, random), 1000);
+}
+
+/// Rays of all kinds from all places, one in eight spoilt.
+fn anywhere(soup: &Soup, n: usize, random: &mut Random) -> Vec<Ray> {
+    (0..n)
+        .map(|_| if random.below(8) == 0 { window(soup, 1.0, 1, random)[0] } else { ray_at(soup, 1.0, random) })
+        .collect()
 }
 
 #[test]

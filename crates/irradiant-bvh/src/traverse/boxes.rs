@@ -85,7 +85,7 @@ pub(crate) mod x86 {
     use crate::level::Level;
     use crate::node::Bvh;
     use crate::ray::{Closest, Leaves};
-    use crate::traverse::{WIDER, packet, walk};
+    use crate::traverse::{WIDER, crowd, packet, walk};
 
     /// One 256-bit register. Made only by the entry points below, on machines with AVX2.
     #[derive(Clone, Copy)]
@@ -247,7 +247,7 @@ pub(crate) mod x86 {
     /// The walks compiled for one set of features, behind a check that the machine has them. Rays go in as eight numbers, in
     /// registers: reading four at once from memory, just after they were written one by one, has to wait for the writes.
     macro_rules! entry_points {
-        ($closest:ident, $any:ident, $closest_packet:ident, $any_packet:ident, $wide:ty, $level:expr, $features:literal) => {
+        ($closest:ident, $any:ident, $closest_packet:ident, $any_packet:ident, $closest_crowd:ident, $any_crowd:ident, $wide:ty, $level:expr, $features:literal) => {
             #[inline]
             #[allow(unsafe_code)]
             pub(crate) fn $closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
@@ -339,6 +339,58 @@ pub(crate) mod x86 {
                 // SAFETY: as above.
                 unsafe { compiled(bvh, rays, leaves, out) }
             }
+
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $closest_crowd<L: Leaves>(
+                bvh: &Bvh,
+                rays: &[Ray],
+                which: &[u16],
+                octant: usize,
+                leaves: &L,
+                out: &mut [Option<Closest<L::UserHit>>],
+            ) {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    rays: &[Ray],
+                    which: &[u16],
+                    octant: usize,
+                    leaves: &L,
+                    out: &mut [Option<Closest<L::UserHit>>],
+                ) {
+                    crowd::closest::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out);
+                }
+                assert!($level <= Level::detect());
+                // SAFETY: as above.
+                unsafe { compiled(bvh, rays, which, octant, leaves, out) }
+            }
+
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $any_crowd<L: Leaves>(
+                bvh: &Bvh,
+                rays: &[Ray],
+                which: &[u16],
+                octant: usize,
+                leaves: &L,
+                out: &mut [bool],
+            ) {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>(
+                    bvh: &Bvh,
+                    rays: &[Ray],
+                    which: &[u16],
+                    octant: usize,
+                    leaves: &L,
+                    out: &mut [bool],
+                ) {
+                    crowd::any::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out);
+                }
+                assert!($level <= Level::detect());
+                // SAFETY: as above.
+                unsafe { compiled(bvh, rays, which, octant, leaves, out) }
+            }
         };
     }
 
@@ -347,6 +399,8 @@ pub(crate) mod x86 {
         any_avx2,
         closest_packet_avx2,
         any_packet_avx2,
+        closest_crowd_avx2,
+        any_crowd_avx2,
         Pair<Avx>,
         Level::Avx2,
         "avx2,fma,bmi1,bmi2,lzcnt,popcnt"
@@ -356,6 +410,8 @@ pub(crate) mod x86 {
         any_avx512,
         closest_packet_avx512,
         any_packet_avx512,
+        closest_crowd_avx512,
+        any_crowd_avx512,
         Avx512,
         Level::Avx512,
         "avx512f,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt"

@@ -12,7 +12,7 @@
 //!   origin: the other is then at minus infinity where entered, plus infinity where left, or NaN), and
 //!   `near <= t < limit <= limit * PADDING`. `limit` only shrinks, to the `t` of the hit.
 //! - With `x = (plane - o) / d` and `e = 2^-24`, what those compute is `x` within `2 e |x|` where entered and `x PADDING`
-//!   within `3 e |x|` where left, and has its sign. The fused form (of [`boxes`] and of rays in a [`packet`]) takes off more than it may have
+//!   within `3 e |x|` where left, and has its sign. The fused form (of [`boxes`] and of rays in a [`packet`] or a [`crowd`]) takes off more than it may have
 //!   lost of the product with the origin (`FUSED_LOST`), so what is left is rounding relative to `x`: at most `x (1 + 2 e)`
 //!   where entered, at least `x WIDER (1 - 3 e)` where left, lanes without a fused operation included. So `near` is at most
 //!   `5 e` too far, less than `PADDING` (`16 e`) allows against the limit; and against `leave`, which has `WIDER` (`32 e`) where
@@ -26,6 +26,7 @@
 
 mod batch;
 mod boxes;
+mod crowd;
 mod packet;
 mod scalar;
 mod walk;

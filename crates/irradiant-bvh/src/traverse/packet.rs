@@ -39,13 +39,18 @@ struct Entry {
 /// One number of each ray.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-struct Column([f32; PACKET]);
+pub(super) struct Column(pub [f32; PACKET]);
 
 impl Column {
     /// Least and greatest. NaN may be passed over.
     #[inline(always)]
     fn range(&self) -> (f32, f32) {
-        (self.fold(|a, b| if a < b { a } else { b }), self.fold(|a, b| if a > b { a } else { b }))
+        (self.least(), self.greatest())
+    }
+
+    #[inline(always)]
+    pub(super) fn least(&self) -> f32 {
+        self.fold(|a, b| if a < b { a } else { b })
     }
 
     #[inline(always)]
@@ -250,7 +255,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
             [E::splat(x_of[b]), E::splat(y_of[b]), E::splat(z_of[b])],
             [E::splat(x_of[c]), E::splat(y_of[c]), E::splat(z_of[c])],
         ];
-        let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0))?;
+        let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0), E::ALL)?;
         if strange != 0 {
             again_in_double(self.rays, &block.triangle(lane), t, strange, &mut found);
         }
@@ -374,7 +379,7 @@ impl Waiting {
 
 /// Bits of a mask, lowest first.
 #[inline(always)]
-fn each(mut mask: u32, mut f: impl FnMut(usize)) {
+pub(super) fn each(mut mask: u32, mut f: impl FnMut(usize)) {
     while mask != 0 {
         f(mask.trailing_zeros() as usize);
         mask &= mask - 1;
@@ -383,7 +388,7 @@ fn each(mut mask: u32, mut f: impl FnMut(usize)) {
 
 /// Rays of a mask one after another, which they are, and how many.
 #[inline(always)]
-fn gathered(mask: u32, ray: impl Fn(usize) -> Ray) -> ([Ray; PACKET], [usize; PACKET], usize) {
+pub(super) fn gathered(mask: u32, ray: impl Fn(usize) -> Ray) -> ([Ray; PACKET], [usize; PACKET], usize) {
     let mut rays = [Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; PACKET];
     let mut which = [0; PACKET];
     let mut n = 0;

@@ -93,11 +93,13 @@ fn hit_of(closest: bvh::Closest<Hit>) -> Hit {
 
 /// Rays that go to a tree in one call: few enough to stay in the nearest cache with their answers.
 const BATCH: usize = 64;
+/// The same where the tree sorts them by where they go.
+const SORTED_BATCH: usize = 256;
 
-/// As the tree wants them; at most [`BATCH`].
-fn gathered(rays: &[Ray], t_max: &[f32]) -> [bvh::Ray; BATCH] {
+/// As the tree wants them; at most `N`.
+fn gathered<const N: usize>(rays: &[Ray], t_max: &[f32]) -> [bvh::Ray; N] {
     let nothing = bvh::Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 };
-    let mut out = [nothing; BATCH];
+    let mut out = [nothing; N];
     for ((out, ray), &t_max) in out.iter_mut().zip(rays).zip(t_max) {
         *out = to_tree(ray, t_max);
     }
@@ -162,11 +164,47 @@ impl Geometry {
     /// If the slices differ in length.
     pub fn intersect_batch(&self, rays: &[Ray], t_max: &[f32], alpha: &impl AlphaTextures, hits: &mut [Option<Hit>]) {
         assert_eq!((rays.len(), rays.len()), (t_max.len(), hits.len()), "one end and one answer for each ray");
+        if self.sorts_rays() {
+            self.closest_of_batch::<SORTED_BATCH>(rays, t_max, alpha, hits);
+        } else {
+            self.closest_of_batch::<BATCH>(rays, t_max, alpha, hits);
+        }
+    }
+
+    /// The same for rays that go anywhere (bounces), `t_max` being infinite: together only where that pays.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn intersect_scattered(&self, rays: &[Ray], alpha: &impl AlphaTextures, hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "one answer for each ray");
+        if self.sorts_rays() {
+            let ends = [f32::INFINITY; SORTED_BATCH];
+            for (rays, hits) in rays.chunks(SORTED_BATCH).zip(hits.chunks_mut(SORTED_BATCH)) {
+                self.closest_of_batch::<SORTED_BATCH>(rays, &ends[..rays.len()], alpha, hits);
+            }
+        } else {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.intersect(ray, f32::INFINITY, alpha);
+            }
+        }
+    }
+
+    fn sorts_rays(&self) -> bool {
+        self.groups[0].tree.sorts_rays(self.level)
+    }
+
+    fn closest_of_batch<const N: usize>(
+        &self,
+        rays: &[Ray],
+        t_max: &[f32],
+        alpha: &impl AlphaTextures,
+        hits: &mut [Option<Hit>],
+    ) {
         let group = &self.groups[0];
         let leaves = GroupLeaves { geometry: self, group, alpha };
-        let mut closest = [None; BATCH];
-        for ((rays, t_max), hits) in rays.chunks(BATCH).zip(t_max.chunks(BATCH)).zip(hits.chunks_mut(BATCH)) {
-            let rays = &gathered(rays, t_max)[..rays.len()];
+        let mut closest = [None; N];
+        for ((rays, t_max), hits) in rays.chunks(N).zip(t_max.chunks(N)).zip(hits.chunks_mut(N)) {
+            let rays = &gathered::<N>(rays, t_max)[..rays.len()];
             let closest = &mut closest[..rays.len()];
             group.tree.intersect_batch(self.level, rays, &leaves, closest);
             for (hit, closest) in hits.iter_mut().zip(closest) {
@@ -184,10 +222,24 @@ impl Geometry {
     /// If the slices differ in length.
     pub fn occluded_batch(&self, rays: &[Ray], t_max: &[f32], alpha: &impl AlphaTextures, out: &mut [bool]) {
         assert_eq!((rays.len(), rays.len()), (t_max.len(), out.len()), "one end and one answer for each ray");
+        if self.sorts_rays() {
+            self.occlusion_of_batch::<SORTED_BATCH>(rays, t_max, alpha, out);
+        } else {
+            self.occlusion_of_batch::<BATCH>(rays, t_max, alpha, out);
+        }
+    }
+
+    fn occlusion_of_batch<const N: usize>(
+        &self,
+        rays: &[Ray],
+        t_max: &[f32],
+        alpha: &impl AlphaTextures,
+        out: &mut [bool],
+    ) {
         let group = &self.groups[0];
         let leaves = GroupLeaves { geometry: self, group, alpha };
-        for ((rays, t_max), out) in rays.chunks(BATCH).zip(t_max.chunks(BATCH)).zip(out.chunks_mut(BATCH)) {
-            let rays = &gathered(rays, t_max)[..rays.len()];
+        for ((rays, t_max), out) in rays.chunks(N).zip(t_max.chunks(N)).zip(out.chunks_mut(N)) {
+            let rays = &gathered::<N>(rays, t_max)[..rays.len()];
             group.tree.occluded_batch(self.level, rays, &leaves, out);
         }
     }

@@ -12,7 +12,7 @@ use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
-use irradiant_math::{Normal3, Point2, Point3, Ray};
+use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
 /// How a path's vertex scatters.
@@ -79,6 +79,8 @@ pub(crate) struct Batch {
     pub(super) specular: [bool; LANES],
     pub(super) throughput: [SampledSpectrum; LANES],
     pub(super) roulette_scale: Floats,
+    /// Rays to the next vertices.
+    pub(super) rays: [Ray; LANES],
     pub(super) met: [Option<Hit>; LANES],
     pub(super) escape_place: [Option<Point2>; LANES],
     /// Which of the batch's samples.
@@ -145,6 +147,7 @@ impl Batch {
             specular: [false; LANES],
             throughput: [SampledSpectrum::ZERO; LANES],
             roulette_scale: [0.0; LANES],
+            rays: [Ray::new(Point3::ZERO, Vec3::Z, 0.0); LANES],
             met: [None; LANES],
             escape_place: [None; LANES],
             sample: [0; LANES],

@@ -391,7 +391,6 @@ impl PathIntegrator {
 
     /// Plays roulette and traces the rays of paths that go on, `depth` scattering events by then. How many do.
     fn go_on(&self, b: &mut Batch, n: usize, depth: u32, scene: &Scene, stats: &mut RenderStats) -> usize {
-        let alpha = scene.alpha();
         let mut stay = 0;
         for i in 0..n {
             let mut throughput = b.throughput[i];
@@ -467,9 +466,10 @@ impl PathIntegrator {
             b.streams.shift(stay, i);
             b.sample[stay] = b.sample[i];
             b.escape_place[stay] = scene.lights.place_of_escape(wi);
-            b.met[stay] = scene.geometry.intersect(&ray, f32::INFINITY, &alpha);
+            b.rays[stay] = ray;
             stay += 1;
         }
+        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
         stay
     }
 }
