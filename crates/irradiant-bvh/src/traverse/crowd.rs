@@ -6,13 +6,13 @@
 
 use super::boxes::{BoxTest, FUSED_LIMIT, FUSED_LOST};
 use super::packet::{Column, PACKET, each, gathered};
-use super::scalar::counts;
+use super::side_by_side::{Bests, Lines};
 use super::walk::{self, Stack};
-use super::{Best, PADDING, WIDER};
+use super::{PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
-use crate::triangle::{self, Candidate, Candidates, Shear};
+use crate::triangle::{self, Candidates, Shear};
 
 /// This many rays or fewer go on alone. With 3: the interior of the benchmark 1.02 of the time; with 8: no difference. At a leaf rays never do: with 4, the Cornell
 /// box 1.1.
@@ -47,9 +47,8 @@ pub(super) fn kind(ray: &Ray) -> usize {
 
 /// Rays of an octant side by side. Lanes without a ray repeat the last one.
 struct Crowd<E> {
-    origin: [E; 3],
+    lines: Lines<E>,
     /// As in [`super::boxes`], where the fused form is explained.
-    inverse: [E; 3],
     entering: [E; 3],
     padded: [E; 3],
     leaving: [E; 3],
@@ -95,8 +94,7 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
         let fastest = [is_x, is_y];
         let ([sx, sy, sz], sheared_origin) = (along(fastest, d), along(fastest, o));
         let crowd = Self {
-            origin: o,
-            inverse,
+            lines: Lines { origin: o, inverse },
             entering,
             padded,
             leaving,
@@ -114,7 +112,7 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
         let (mut near, mut far) = (E::splat(0.0), far);
         for k in 0..3 {
             let plane = |p: usize| E::splat(node.planes[p][slot]);
-            near = plane(self.first[k]).multiply_add(self.inverse[k], self.entering[k]).max(near);
+            near = plane(self.first[k]).multiply_add(self.lines.inverse[k], self.entering[k]).max(near);
             far = plane(self.first[k] ^ 1).multiply_add(self.padded[k], self.leaving[k]).min(far);
         }
         (near, near.le(far).mask())
@@ -145,24 +143,6 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
         }
         Some(found)
     }
-
-    /// What becomes of candidates when the triangle's own box is asked: the operations of `within_own_box`. The distances, and which do not count.
-    #[inline(always)]
-    fn within_own_box(&self, vertices: &[[f32; 3]; 3], t: E) -> (E, u32) {
-        let (mut near, mut far) = (E::splat(0.0), E::splat(f32::INFINITY));
-        let [a, b, c] = vertices;
-        for k in 0..3 {
-            let low = if a[k] < b[k] { a[k] } else { b[k] };
-            let low = if low < c[k] { low } else { c[k] };
-            let high = if a[k] > b[k] { a[k] } else { b[k] };
-            let high = if high > c[k] { high } else { c[k] };
-            let (first, last) = if self.first[k] & 1 == 0 { (low, high) } else { (high, low) };
-            let (o, inverse) = (self.origin[k], self.inverse[k]);
-            near = ((E::splat(first) - o) * inverse).max(near);
-            far = ((E::splat(last) - o) * (inverse * E::splat(PADDING))).min(far);
-        }
-        (near.max(t), near.le(far).mask())
-    }
 }
 
 /// Along the axes of each lane's shear.
@@ -191,74 +171,6 @@ fn again_in_double<E: Lanes<Array = [f32; PACKET]>>(
             found.mask |= 1 << i;
             (found.t[i], found.u[i], found.v[i]) = (hit.t, hit.u, hit.v);
         }
-    }
-}
-
-/// The closest hits so far, side by side; see [`Best`].
-struct Bests<U> {
-    t: Column,
-    u: Column,
-    v: Column,
-    rank: [u32; PACKET],
-    user: [Option<U>; PACKET],
-    found: u32,
-}
-
-impl<U: Copy> Bests<U> {
-    #[inline(always)]
-    fn new(t: Column) -> Self {
-        let zero = Column([0.0; PACKET]);
-        Self { t, u: zero, v: zero, rank: [0; PACKET], user: [None; PACKET], found: 0 }
-    }
-
-    #[inline(always)]
-    fn get(&self, i: usize) -> Best<U> {
-        let found = self.found >> i & 1 != 0;
-        Best { t: self.t.0[i], rank: self.rank[i], u: self.u.0[i], v: self.v.0[i], user: self.user[i], found }
-    }
-
-    #[inline(always)]
-    fn set(&mut self, i: usize, best: Best<U>) {
-        (self.t.0[i], self.rank[i], self.u.0[i], self.v.0[i], self.user[i]) =
-            (best.t, best.rank, best.u, best.v, best.user);
-        self.found |= u32::from(best.found) << i;
-    }
-
-    /// Offers a triangle's candidates to all of `active`.
-    #[inline(always)]
-    fn offer<E: Lanes<Array = [f32; PACKET]>, L: Leaves<UserHit = U>>(
-        &mut self,
-        leaves: &L,
-        crowd: &Crowd<E>,
-        ray: impl Fn(usize) -> Ray,
-        block: &Block,
-        lane: usize,
-        found: &Candidates<E>,
-    ) {
-        let id = block.id(lane);
-        let index = id & Block::INDEX;
-        let (t, inside) = crowd.within_own_box(&block.triangle(lane), E::load(&found.t));
-        let best = E::load(&self.t.0);
-        let candidates = found.mask & inside;
-        let mut nearer = candidates & t.lt(best).mask();
-        let equal = candidates & t.le(best).mask() & !nearer;
-        each(equal, |i| nearer |= u32::from(index < self.rank[i]) << i);
-        if L::HAS_FILTER && id & Block::FILTERED != 0 {
-            let t = t.to_array();
-            each(nearer, |i| {
-                if !leaves.accept(index, &ray(i), t[i], found.u[i], found.v[i]) {
-                    nearer &= !(1 << i);
-                }
-            });
-        }
-        if nearer == 0 {
-            return;
-        }
-        self.t = Column(E::select(nearer, t, best).to_array());
-        self.u = Column(E::select(nearer, E::load(&found.u), E::load(&self.u.0)).to_array());
-        self.v = Column(E::select(nearer, E::load(&found.v), E::load(&self.v.0)).to_array());
-        each(nearer, |i| self.rank[i] = index);
-        self.found |= nearer;
     }
 }
 
@@ -301,7 +213,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                     if let Some(found) = crowd.meet(rays, which, block, lane, E::load(&best.t.0), active)
                         && found.mask != 0
                     {
-                        best.offer(leaves, &crowd, ray, block, lane, &found);
+                        best.offer(leaves, &crowd.lines, ray, block, lane, &found);
                     }
                 }
                 if block.is_last() {
@@ -361,7 +273,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
         }
     }
     for (i, &ray) in which.iter().enumerate() {
-        out[ray as usize] = best.get(i).finish();
+        out[ray as usize] = best.finish(i);
     }
 }
 
@@ -398,16 +310,7 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                     if found.mask == 0 {
                         continue;
                     }
-                    let id = block.id(lane);
-                    if L::HAS_FILTER && id & Block::FILTERED != 0 {
-                        each(found.mask, |i| {
-                            let at = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
-                            blocked |= u32::from(counts(leaves, &ray(i), block, lane, at)) << i;
-                        });
-                    } else {
-                        let (t, inside) = crowd.within_own_box(&block.triangle(lane), E::load(&found.t));
-                        blocked |= found.mask & inside & t.lt(ends).mask();
-                    }
+                    blocked |= crowd.lines.stopped(leaves, ray, ends, block, lane, &found);
                 }
                 if block.is_last() {
                     break;

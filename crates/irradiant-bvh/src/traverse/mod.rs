@@ -29,6 +29,7 @@ mod boxes;
 mod crowd;
 mod packet;
 mod scalar;
+mod side_by_side;
 mod walk;
 
 #[cfg(test)]

@@ -9,8 +9,9 @@
 
 use super::boxes::{BoxTest, FUSED_LIMIT, FUSED_LOST};
 use super::scalar::counts;
+use super::side_by_side::{Bests, Lines};
 use super::walk::{self, Stack};
-use super::{Best, PADDING, WIDER};
+use super::{PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
@@ -91,7 +92,7 @@ struct Packet<'a, E, B: BoxTest> {
     intervals: [Interval<B::Eight>; 3],
     /// Boxes are entered at `plane * inverse + entering` and left at `plane * padded + leaving`, as in [`super::boxes`],
     /// where the fused form is explained.
-    inverse: [E; 3],
+    lines: Lines<E>,
     entering: [E; 3],
     padded: [E; 3],
     leaving: [E; 3],
@@ -179,7 +180,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         let packet = Self {
             rays,
             intervals,
-            inverse,
+            lines: Lines { origin: o, inverse },
             entering,
             padded,
             leaving,
@@ -221,7 +222,7 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         let plane = |k: usize| E::splat(node.planes[k][slot]);
         let (mut near, mut far) = (E::splat(0.0), E::load(&t.0) * E::splat(PADDING));
         for k in 0..3 {
-            let enters = |plane: E| plane.multiply_add(self.inverse[k], self.entering[k]);
+            let enters = |plane: E| plane.multiply_add(self.lines.inverse[k], self.entering[k]);
             let leaves = |plane: E| plane.multiply_add(self.padded[k], self.leaving[k]);
             let first = self.intervals[k].first;
             if first == Interval::<E>::BOTH {
@@ -247,7 +248,14 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
 
     /// The hits of one triangle.
     #[inline(always)]
-    fn meet(&self, [x, y, z]: [usize; 3], block: &Block, lane: usize, t: &Column) -> Option<triangle::Candidates<E>> {
+    fn meet(
+        &self,
+        [x, y, z]: [usize; 3],
+        block: &Block,
+        lane: usize,
+        t: &Column,
+        active: u32,
+    ) -> Option<triangle::Candidates<E>> {
         let (a, b, c) = (block.corner(lane, 0), block.corner(lane, 1), block.corner(lane, 2));
         let [x_of, y_of, z_of] = [&block.vertices[x], &block.vertices[y], &block.vertices[z]];
         let along = [
@@ -255,50 +263,11 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
             [E::splat(x_of[b]), E::splat(y_of[b]), E::splat(z_of[b])],
             [E::splat(x_of[c]), E::splat(y_of[c]), E::splat(z_of[c])],
         ];
-        let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0), E::ALL)?;
+        let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0), active)?;
         if strange != 0 {
             again_in_double(self.rays, &block.triangle(lane), t, strange, &mut found);
         }
         Some(found)
-    }
-
-    /// Calls `hit` with ray, triangle (block and lane) and place for all that the rays of `active` meet in a leaf before `t`, which `hit`
-    /// may shorten.
-    #[inline(always)]
-    fn leaf(
-        &self,
-        bvh: &Bvh,
-        leaf: Child,
-        active: u32,
-        t: &mut Column,
-        mut hit: impl FnMut(usize, &Block, usize, Candidate) -> f32,
-    ) {
-        for index in leaf.index().. {
-            let block = &bvh.blocks[index];
-            if active.count_ones() > FEW_AT_LEAF
-                && let Some(axes) = self.axes
-            {
-                for lane in 0..block.count() {
-                    let Some(found) = self.meet(axes, block, lane, t) else { continue };
-                    each(found.mask & active, |i| {
-                        let candidate = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
-                        t.0[i] = hit(i, block, lane, candidate);
-                    });
-                }
-            } else {
-                each(active, |ray| {
-                    let shear = self.shear(ray);
-                    let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, t.0[ray]) else { return };
-                    each(found.mask, |lane| {
-                        let candidate = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
-                        t.0[ray] = hit(ray, block, lane, candidate);
-                    });
-                });
-            }
-            if block.is_last() {
-                break;
-            }
-        }
     }
 }
 
@@ -410,9 +379,9 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     if bvh.nodes.is_empty() || rays.len() <= FEW as usize {
         return false;
     }
-    let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
-    let mut best: [Best<L::UserHit>; PACKET] = std::array::from_fn(|i| Best::new(t.0[i]));
+    let Some((packet, t)) = Packet::<E, B>::new(rays) else { return false };
     let mut far = t.greatest();
+    let mut best = Bests::new(t);
     let mut waiting = Waiting { stack: Stack::new(), n: 0 };
     let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
     waiting.push(bvh, 0, mask, &near);
@@ -420,7 +389,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
         if entry.near > far * PADDING {
             continue;
         }
-        let active = packet.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, &t);
+        let active = packet.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, &best.t);
         if active == 0 {
             continue;
         }
@@ -431,33 +400,59 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 continue;
             }
             each(active, |i| {
-                walk::closest_below::<B, L>(bvh, entry.child, &rays[i], leaves, &mut best[i]);
-                t.0[i] = best[i].t;
+                let mut one = best.get(i);
+                walk::closest_below::<B, L>(bvh, entry.child, &rays[i], leaves, &mut one);
+                best.set(i, one);
             });
         } else if entry.child.is_users() {
             for index in entry.child.index().. {
                 let user = bvh.users[index];
-                let (rays, which, n) = gathered(active, |i| best[i].ray_for_user(&rays[i]));
+                let (rays, which, n) = gathered(active, |i| best.get(i).ray_for_user(&rays[i]));
                 let mut hits = [None; PACKET];
                 leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
                 for (&i, hit) in which[..n].iter().zip(hits) {
-                    best[i].offer_user_hit(user & !LAST_USER, hit);
-                    t.0[i] = best[i].t;
+                    let mut one = best.get(i);
+                    one.offer_user_hit(user & !LAST_USER, hit);
+                    best.set(i, one);
                 }
                 if user & LAST_USER != 0 {
                     break;
                 }
             }
         } else {
-            packet.leaf(bvh, entry.child, active, &mut t, |i, block, lane, at| {
-                best[i].offer_triangle(leaves, &rays[i], block.id(lane), at, || block.triangle(lane));
-                best[i].t
-            });
+            for index in entry.child.index().. {
+                let block = &bvh.blocks[index];
+                if active.count_ones() > FEW_AT_LEAF
+                    && let Some(axes) = packet.axes
+                {
+                    for lane in 0..block.count() {
+                        if let Some(found) = packet.meet(axes, block, lane, &best.t, active)
+                            && found.mask != 0
+                        {
+                            best.offer(leaves, &packet.lines, |i| rays[i], block, lane, &found);
+                        }
+                    }
+                } else {
+                    each(active, |i| {
+                        let mut one = best.get(i);
+                        let found = triangle::intersect_block::<B::Eight>(block, &packet.shear(i), one.t);
+                        let Some(found) = found else { return };
+                        each(found.mask, |lane| {
+                            let at = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                            one.offer_triangle(leaves, &rays[i], block.id(lane), at, || block.triangle(lane));
+                        });
+                        best.set(i, one);
+                    });
+                }
+                if block.is_last() {
+                    break;
+                }
+            }
         }
-        far = t.greatest();
+        far = best.t.greatest();
     }
-    for (out, best) in out.iter_mut().zip(best) {
-        *out = best.finish();
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = best.finish(i);
     }
     true
 }
@@ -509,11 +504,34 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 }
             }
         } else {
-            packet.leaf(bvh, entry.child, active, &mut t, |i, block, lane, at| {
-                let is_hit = counts(leaves, &rays[i], block, lane, at);
-                blocked |= u32::from(is_hit) << i;
-                if is_hit || blocked >> i & 1 != 0 { f32::NEG_INFINITY } else { rays[i].t_max }
-            });
+            for index in entry.child.index().. {
+                let block = &bvh.blocks[index];
+                let active = active & !blocked;
+                if active.count_ones() > FEW_AT_LEAF
+                    && let Some(axes) = packet.axes
+                {
+                    for lane in 0..block.count() {
+                        if let Some(found) = packet.meet(axes, block, lane, &t, active & !blocked)
+                            && found.mask != 0
+                        {
+                            let ends = E::load(&t.0);
+                            blocked |= packet.lines.stopped(leaves, |i| rays[i], ends, block, lane, &found);
+                        }
+                    }
+                } else {
+                    each(active, |i| {
+                        let found = triangle::intersect_block::<B::Eight>(block, &packet.shear(i), t.0[i]);
+                        let Some(found) = found else { return };
+                        each(found.mask, |lane| {
+                            let at = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                            blocked |= u32::from(counts(leaves, &rays[i], block, lane, at)) << i;
+                        });
+                    });
+                }
+                if block.is_last() {
+                    break;
+                }
+            }
         }
         if blocked != 0 {
             each(blocked, |i| {
