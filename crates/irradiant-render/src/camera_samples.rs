@@ -163,7 +163,7 @@ pub(crate) fn for_each_batch(
 }
 
 /// The camera rays of samples and how far they go. Where the camera sees nothing, a ray without length stands in.
-fn gather(samples: &[CameraSample], rays: &mut Vec<Ray>, ends: &mut Vec<f32>) {
+pub(crate) fn gather(samples: &[CameraSample], rays: &mut Vec<Ray>, ends: &mut Vec<f32>) {
     rays.clear();
     ends.clear();
     for sample in samples {

@@ -86,13 +86,13 @@ pub(crate) fn samples_of(scene: &Scene, at: &ReferencePoint, light: LightId, spl
 
 /// As [`samples_of`], of a light that is picked with the chance `pmf`.
 #[inline]
-fn samples_by_chance(pmf: f32, splits: u32) -> f32 {
+pub(crate) fn samples_by_chance(pmf: f32, splits: u32) -> f32 {
     (pmf * splits as f32).min(1.0)
 }
 
 /// Whether there is a stratum for each light.
 #[inline]
-fn all_are_sampled(scene: &Scene, splits: u32) -> bool {
+pub(crate) fn all_are_sampled(scene: &Scene, splits: u32) -> bool {
     splits > 1 && scene.lights.len() <= splits as usize
 }
 
@@ -140,7 +140,7 @@ fn split_light<R: PathRecorder>(
     recorder: &mut R,
 ) -> SampledSpectrum {
     let mut sum = SampledSpectrum::ZERO;
-    for (picked, share) in PickedLights::of(scene, at, draws, splits).iter() {
+    for (picked, share) in PickedLights::of(scene, &at.reference(), draws, splits).iter() {
         if let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared) {
             let samples = samples_by_chance(picked.pmf, splits);
             sum += scattered(scene, at, bsdf, throughput, arriving, samples, share, depth, stats, recorder);
@@ -151,7 +151,7 @@ fn split_light<R: PathRecorder>(
 
 /// Strata into which a choice of light is split: one light needs no choice.
 #[inline]
-fn strata(scene: &Scene, splits: u32) -> u32 {
+pub(crate) fn strata(scene: &Scene, splits: u32) -> u32 {
     if splits > 1 && scene.lights.as_slice().len() == 1 { 1 } else { splits }
 }
 
@@ -165,7 +165,7 @@ pub(crate) struct PickedLights {
 
 impl PickedLights {
     /// Of `splits` strata, [`MOST_SPLITS`] at most.
-    pub fn of(scene: &Scene, at: &Interaction, draws: &LightDraws, splits: u32) -> Self {
+    pub fn of(scene: &Scene, at: &ReferencePoint, draws: &LightDraws, splits: u32) -> Self {
         let none = (PickedLight { id: LightId(0), pmf: 0.0 }, 0);
         let strata = strata(scene, splits);
         let mut picked = Self { strata, lights: [none; MOST_SPLITS as usize], count: 0 };
@@ -176,10 +176,9 @@ impl PickedLights {
             picked.count = scene.lights.len();
             return picked;
         }
-        let reference = at.reference();
         for stratum in 0..strata {
             let pick = draws.pick_in_stratum(stratum, strata);
-            if let Some(light) = scene.light_sampler.sample(&reference, pick) {
+            if let Some(light) = scene.light_sampler.sample(at, pick) {
                 picked.add(light);
             }
         }

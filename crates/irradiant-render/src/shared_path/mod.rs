@@ -20,7 +20,9 @@
 //! many pixels has the error that [`path`](crate::path) would give it. All of a block share the time; each path has wavelengths of its
 //! own, at which it is seen by all, or blocks would be tinted.
 
+pub(crate) mod blocks;
 mod share;
+mod staged;
 
 use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
@@ -74,20 +76,20 @@ struct First {
 }
 
 /// A surface that a path meets next, with the light that it scatters (its own emission is not shared).
-struct Second {
-    place: ReferencePoint,
-    wo: Vec3,
+pub(crate) struct Second {
+    pub place: ReferencePoint,
+    pub wo: Vec3,
     /// Density with which its own path's first vertex found it, 1/sr.
-    pdf: f32,
+    pub pdf: f32,
     /// What the path carries there: f cos / pdf.
-    carried: SampledSpectrum,
-    light: Scattered,
+    pub carried: SampledSpectrum,
+    pub light: Scattered,
 }
 
 /// Light that leaves a surface.
 // A box would be allocated at each surface.
 #[allow(clippy::large_enum_variant)]
-enum Scattered {
+pub(crate) enum Scattered {
     /// The same radiance in all directions of the side of this normal.
     Evenly { normal: Vec3, radiance: SampledSpectrum },
     /// As its BSDF has it.
@@ -95,14 +97,14 @@ enum Scattered {
 }
 
 /// Light that arrives at a second vertex, by one sample of it.
-struct Incoming {
-    wi: Vec3,
+pub(crate) struct Incoming {
+    pub wi: Vec3,
     /// Arriving radiance.
-    radiance: SampledSpectrum,
+    pub radiance: SampledSpectrum,
     /// Density with which light samples find it, 1/sr; 0 where they cannot.
-    light_pdf: f32,
+    pub light_pdf: f32,
     /// Whether drawing directions from the BSDF finds it.
-    found_by_bsdf: bool,
+    pub found_by_bsdf: bool,
 }
 
 /// A path of the block.
@@ -135,24 +137,11 @@ struct Scratch<'a> {
 
 impl Integrator for SharedPathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
-        let bounds = &unit.bounds;
-        let mut scratch = Scratch::default();
-        scratch.layers.resize(scene.layers.channels() * PIXELS, 0.0);
-        let channels = scene.layers.channels();
-        for block in blocks(bounds) {
-            for index in unit.samples.clone() {
-                self.block(scene, &block, index, &mut scratch, stats);
-                for (i, member) in scratch.members.iter().enumerate() {
-                    let [x, y] = member.sample.pixel;
-                    if x < bounds.x0 || x >= bounds.x1 || y < bounds.y0 || y >= bounds.y1 {
-                        continue;
-                    }
-                    stats.paths += 1;
-                    if !tile.add(x, y, member.rgb(scene), &scratch.layers[i * channels..(i + 1) * channels]) {
-                        stats.refuse(x, y, index);
-                    }
-                }
-            }
+        let path = self.path();
+        if path.has_stages(scene) {
+            self.render_in_batches(&path, scene, unit, tile, stats);
+        } else {
+            self.render_alone(scene, unit, tile, stats);
         }
     }
 
@@ -177,6 +166,40 @@ impl Integrator for SharedPathIntegrator {
 }
 
 impl SharedPathIntegrator {
+    /// By whose rules paths go where nothing is shared.
+    fn path(&self) -> PathIntegrator {
+        PathIntegrator { max_depth: self.max_depth, light_splits: self.light_splits, ..PathIntegrator::default() }
+    }
+
+    /// As [`Integrator::render`], one path at a time: the specification of what is done for many at once where the scene allows it, the same
+    /// bits.
+    pub fn render_alone(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
+        let bounds = &unit.bounds;
+        let mut scratch = Scratch::default();
+        scratch.layers.resize(scene.layers.channels() * PIXELS, 0.0);
+        let channels = scene.layers.channels();
+        for block in blocks_of(bounds) {
+            for index in unit.samples.clone() {
+                self.block(scene, &block, index, &mut scratch, stats);
+                for (i, member) in scratch.members.iter().enumerate() {
+                    let [x, y] = member.sample.pixel;
+                    if x < bounds.x0 || x >= bounds.x1 || y < bounds.y0 || y >= bounds.y1 {
+                        continue;
+                    }
+                    stats.paths += 1;
+                    if !tile.add(
+                        x,
+                        y,
+                        film_rgb(scene, &member.sample, &member.lambda, member.radiance, member.shared),
+                        &scratch.layers[i * channels..(i + 1) * channels],
+                    ) {
+                        stats.refuse(x, y, index);
+                    }
+                }
+            }
+        }
+    }
+
     /// The paths of one sample of a block's pixels, with all light that they bring to their pixels.
     fn block<'a>(
         &self,
@@ -188,23 +211,15 @@ impl SharedPathIntegrator {
     ) {
         let Scratch { members, layers, camera_rays, ends, incoming, .. } = scratch;
         incoming.clear();
-        let time = scene.sampler.stream([block.x0, block.y0], index).camera().time;
         members.clear();
-        for y in block.y0..block.y1 {
-            for x in block.x0..block.x1 {
-                let stream = scene.sampler.stream([x, y], index);
-                let draws = CameraDraws { time, ..stream.camera() };
-                let sample = camera_sample_by(scene, [x, y], index, stream, draws);
-                members.push(Member {
-                    lambda: sample.lambda,
-                    sample,
-                    radiance: SampledSpectrum::ZERO,
-                    shared: [0.0; 3],
-                    first: None,
-                    second: None,
-                });
-            }
-        }
+        members.extend(samples_of_block(scene, block, index).map(|sample| Member {
+            lambda: sample.lambda,
+            sample,
+            radiance: SampledSpectrum::ZERO,
+            shared: [0.0; 3],
+            first: None,
+            second: None,
+        }));
         layers.fill(0.0);
         // Where the camera sees nothing, a ray without length stands in.
         camera_rays.clear();
@@ -249,8 +264,7 @@ impl SharedPathIntegrator {
         stats: &mut RenderStats,
         incoming: &mut Vec<Incoming>,
     ) {
-        let path =
-            PathIntegrator { max_depth: self.max_depth, light_splits: self.light_splits, ..PathIntegrator::default() };
+        let path = self.path();
         let Some(camera_ray) = member.sample.camera_ray else { return };
         let stream = member.sample.stream;
 
@@ -378,7 +392,8 @@ impl SharedPathIntegrator {
         incoming: &mut Vec<Incoming>,
     ) {
         let stream = &member.sample.stream;
-        if let Some(pick) = pick_light(scene, at, lambda, &stream.light(1))
+        if bsdf.flags().is_non_specular()
+            && let Some(pick) = pick_light(scene, at, lambda, &stream.light(1))
             && !pick.radiance.is_black()
         {
             stats.shadow_rays += 1;
@@ -407,7 +422,7 @@ impl SharedPathIntegrator {
         // the direction (1), when [`Lamps`] catches what light samples find too and divides the weight out; and with none, when
         // the rest of the path brings but what they cannot find.
         walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 1.0, specular: false, light_splits: 1 });
-        let mut lamps = Lamps(drawn.wi, incoming);
+        let mut lamps = Lamps(drawn.wi, |light| incoming.push(light));
         match walk.met {
             None => _ = path.escaped(scene, &walk, lambda, &mut lamps),
             Some(hit) => {
@@ -424,13 +439,13 @@ impl SharedPathIntegrator {
 }
 
 /// Catches what a ray sees of lamps that light samples find too, unweighted.
-struct Lamps<'a>(Vec3, &'a mut Vec<Incoming>);
+pub(crate) struct Lamps<F>(pub Vec3, pub F);
 
-impl PathRecorder for Lamps<'_> {
+impl<F: FnMut(Incoming)> PathRecorder for Lamps<F> {
     fn contribution(&mut self, c: &Contribution) {
         if c.light_pdf > 0.0 && c.mis_weight > 0.0 {
             let radiance = c.radiance * (1.0 / c.mis_weight);
-            self.1.push(Incoming { wi: self.0, radiance, light_pdf: c.light_pdf, found_by_bsdf: true });
+            (self.1)(Incoming { wi: self.0, radiance, light_pdf: c.light_pdf, found_by_bsdf: true });
         }
     }
 }
@@ -458,7 +473,7 @@ fn draw(bsdf: &Bsdf, wo: Vec3, draws: &ScatterDraws) -> Option<BsdfSample> {
 }
 
 /// Whether a vertex of this kind can be shared: directions are drawn with the very density that is stated, and no lobe is a delta.
-fn is_shared(bsdf: &Bsdf) -> bool {
+pub(crate) fn is_shared(bsdf: &Bsdf) -> bool {
     match bsdf.bxdf {
         Bxdf::Diffuse(_) | Bxdf::DiffuseTransmission(_) | Bxdf::Conductor(_) => !bsdf.flags().is_specular(),
         _ => false,
@@ -466,26 +481,18 @@ fn is_shared(bsdf: &Bsdf) -> bool {
 }
 
 /// What roulette takes a path's own pixel to be worth at least, since others may see more of what the path finds.
-const LEAST_IMPORTANCE: f32 = 0.1;
+pub(crate) const LEAST_IMPORTANCE: f32 = 0.1;
 
 /// First vertices on metals with facets of a smaller alpha do not take part: what lights one pixel's mirror image is of no use to its
 /// neighbour's.
-const LEAST_ALPHA: f32 = 0.04;
+pub(crate) const LEAST_ALPHA: f32 = 0.04;
 
 /// Whether a first vertex of this kind gains from what its neighbours' paths find.
-fn gains(bsdf: &Bsdf) -> bool {
+pub(crate) fn gains(bsdf: &Bsdf) -> bool {
     is_shared(bsdf) && !matches!(&bsdf.bxdf, Bxdf::Conductor(metal) if metal.alpha() < LEAST_ALPHA)
 }
 
 impl Member<'_> {
-    /// What the film gets.
-    fn rgb(&self, scene: &Scene) -> [f32; 3] {
-        let Some(camera_ray) = &self.sample.camera_ray else { return [0.0; 3] };
-        let own = scene.sensor_response(self.radiance * camera_ray.weight, &self.lambda);
-        let response = std::array::from_fn(|c| own[c] + self.shared[c] * camera_ray.weight);
-        scene.film_rgb_of_response(response).map(|c| c * self.sample.filter_weight)
-    }
-
     /// Scattering at the first vertex for another path's wavelengths.
     fn bsdf_at(&self, scene: &Scene, first: &First, lambda: &Wavelengths) -> Option<Bsdf> {
         let mix = self.sample.stream.mix(0);
@@ -495,10 +502,38 @@ impl Member<'_> {
 }
 
 /// The blocks that have a pixel in `bounds`, aligned to multiples of their side, so that a pixel's companions do not depend on what is rendered.
-fn blocks(bounds: &PixelBounds) -> impl Iterator<Item = PixelBounds> {
+fn blocks_of(bounds: &PixelBounds) -> impl Iterator<Item = PixelBounds> {
     let first = |low: i32| low.div_euclid(SIDE) * SIDE;
     let (left, right) = (first(bounds.x0), bounds.x1);
     (first(bounds.y0)..bounds.y1).step_by(SIDE as usize).flat_map(move |y0| {
         (left..right).step_by(SIDE as usize).map(move |x0| PixelBounds { x0, y0, x1: x0 + SIDE, y1: y0 + SIDE })
     })
+}
+
+/// The samples of one index of a block's pixels, row by row. They share the time.
+fn samples_of_block<'a>(
+    scene: &'a Scene,
+    block: &PixelBounds,
+    index: u32,
+) -> impl Iterator<Item = CameraSample<'a>> + use<'a> {
+    let PixelBounds { x0, x1, y0, y1 } = *block;
+    let time = scene.sampler.stream([x0, y0], index).camera().time;
+    (y0..y1).flat_map(move |y| (x0..x1).map(move |x| [x, y])).map(move |pixel| {
+        let stream = scene.sampler.stream(pixel, index);
+        camera_sample_by(scene, pixel, index, stream, CameraDraws { time, ..stream.camera() })
+    })
+}
+
+/// What the film gets of a sample: of its own radiance at its wavelengths, and of what the sensor makes of light that is shared.
+fn film_rgb(
+    scene: &Scene,
+    sample: &CameraSample,
+    lambda: &Wavelengths,
+    radiance: SampledSpectrum,
+    shared: [f32; 3],
+) -> [f32; 3] {
+    let Some(camera_ray) = &sample.camera_ray else { return [0.0; 3] };
+    let own = scene.sensor_response(radiance * camera_ray.weight, lambda);
+    let response = std::array::from_fn(|c| own[c] + shared[c] * camera_ray.weight);
+    scene.film_rgb_of_response(response).map(|c| c * sample.filter_weight)
 }

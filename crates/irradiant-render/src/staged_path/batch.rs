@@ -1,9 +1,10 @@
 //! The numbers of many paths side by side, between vertices and at them.
 
+use crate::camera_samples::CameraSample;
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::MirrorLobe;
-use irradiant_core::bxdf::{Conductor, Ggx};
+use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
 use irradiant_core::geometry::{Hit, RectangleLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
@@ -12,8 +13,9 @@ use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
-use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3};
+use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use std::f32::consts::FRAC_1_PI;
 
 /// How a path's vertex scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +41,7 @@ pub(super) enum Surface {
 
 /// What a material is that is the same everywhere.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Plain {
+pub(crate) enum Plain {
     /// Diffuse, of this reflectance.
     Diffuse(SampledSpectrum),
     /// A rough metal.
@@ -77,6 +79,8 @@ pub(crate) struct Batch {
     pub(super) previous: [Triples; 4],
     pub(super) bsdf_pdf: Floats,
     pub(super) specular: [bool; LANES],
+    /// Strata of the choice of a light at the last vertex, the same for all.
+    pub(super) light_splits: u32,
     pub(super) throughput: [SampledSpectrum; LANES],
     pub(super) roulette_scale: Floats,
     /// Rays to the next vertices.
@@ -113,12 +117,17 @@ pub(crate) struct Batch {
     pub(super) arriving: [SampledSpectrum; LANES],
     /// The chance with which the light was picked; 0 where none is sampled.
     pub(super) pmf: Floats,
+    /// How often the light is sampled at the vertex on average, and the share of all samples that this one stands for.
+    pub(super) light_times: Floats,
+    pub(super) light_share: Floats,
     /// The cosine where it is scattered, and the weight of the sample over its density.
     pub(super) light_cosine: Floats,
     pub(super) light_factor: Floats,
     /// Paths whose light samples are drawn alone, and their way to the sky.
     pub(super) light_alone: Vec<(u32, PickedLight, Option<PixelLine>)>,
     pub(super) light_runs: Vec<Option<PixelRun>>,
+    /// Where several lights are sampled, those of one path after those of another, each with its share of the strata.
+    pub(super) light_picks: Vec<(PickedLight, f32)>,
     pub(super) shadow_rays: Vec<Ray>,
     pub(super) shadow_ends: Vec<f32>,
     /// The sample that each would bring this to.
@@ -145,6 +154,7 @@ impl Batch {
             previous: [Triples::ZERO; 4],
             bsdf_pdf: [0.0; LANES],
             specular: [false; LANES],
+            light_splits: 1,
             throughput: [SampledSpectrum::ZERO; LANES],
             roulette_scale: [0.0; LANES],
             rays: [Ray::new(Point3::ZERO, Vec3::Z, 0.0); LANES],
@@ -171,10 +181,13 @@ impl Batch {
             is_delta: [0; LANES],
             arriving: [SampledSpectrum::ZERO; LANES],
             pmf: [0.0; LANES],
+            light_times: [0.0; LANES],
+            light_share: [0.0; LANES],
             light_cosine: [0.0; LANES],
             light_factor: [0.0; LANES],
             light_alone: Vec::new(),
             light_runs: Vec::new(),
+            light_picks: Vec::new(),
             shadow_rays: Vec::new(),
             shadow_ends: Vec::new(),
             shadow_light: Vec::new(),
@@ -183,6 +196,24 @@ impl Batch {
             next_pdf: [0.0; LANES],
             next_factor: [0.0; LANES],
         })
+    }
+
+    /// Puts the camera rays of some samples into lanes, whose first hits are known. How many there are.
+    pub fn begin(&mut self, scene: &Scene, samples: &[CameraSample], hits: &[Option<Hit>]) -> usize {
+        let mut n = 0;
+        for (s, sample) in samples.iter().enumerate() {
+            let Some(camera_ray) = &sample.camera_ray else { continue };
+            let ray = &camera_ray.ray;
+            self.o.set(n, ray.o.to_array());
+            self.d.set(n, ray.d.to_array());
+            self.time[n] = ray.time;
+            self.streams.set(n, &sample.stream);
+            self.escape_place[n] = hits[s].map_or_else(|| scene.lights.place_of_escape(ray.d), |_| None);
+            (self.throughput[n], self.roulette_scale[n]) = (SampledSpectrum::ONE, 1.0);
+            (self.met[n], self.sample[n]) = (hits[s], s as u32);
+            n += 1;
+        }
+        n
     }
 
     #[inline(always)]
@@ -196,7 +227,12 @@ impl Batch {
             let [p, p_error, n, ns] = &self.previous;
             let reference =
                 ReferencePoint { p: p.point(i), p_error: p_error.vector(i), n: n.normal(i), ns: ns.normal(i) };
-            Previous { reference, bsdf_pdf: self.bsdf_pdf[i], specular: self.specular[i], light_splits: 1 }
+            Previous {
+                reference,
+                bsdf_pdf: self.bsdf_pdf[i],
+                specular: self.specular[i],
+                light_splits: self.light_splits,
+            }
         });
         Walk {
             throughput: self.throughput[i],
@@ -233,9 +269,9 @@ impl Batch {
     /// The weight of a lane's light sample over its density, where scattering finds its direction with the density `pdf`.
     #[inline(always)]
     pub fn light_weight(&self, i: usize, pdf: f32) -> f32 {
-        let light_pdf = self.pmf[i] * self.targets.pdf[i];
-        let weight = power_heuristic(light_pdf, pdf);
-        (if self.is_delta[i] != 0 { 1.0 } else { weight }) / light_pdf
+        let weight = power_heuristic(self.light_times[i] * self.targets.pdf[i], pdf);
+        let weight = if self.is_delta[i] != 0 { 1.0 } else { weight };
+        weight * self.light_share[i] / (self.pmf[i] * self.targets.pdf[i])
     }
 
     /// Whether any of the lanes of a vector is one of metal.
@@ -286,4 +322,113 @@ impl Batch {
             ..Interaction::unknown(&self.ray(i), 0.0)
         }
     }
+
+    /// How light scatters at a lane's vertex, of whatever kind.
+    pub fn bsdf(&self, i: usize) -> Bsdf {
+        match self.scattering[i] {
+            Scattering::Alone(k) => self.bsdfs[k as usize],
+            Scattering::Metal => Bsdf::new(self.at.frame(i), Bxdf::Conductor(self.metals[i])),
+            Scattering::Diffuse | Scattering::Gone => {
+                Bsdf::new(self.at.frame(i), Bxdf::Diffuse(Diffuse::new(self.reflectance[i])))
+            }
+        }
+    }
+
+    /// Whether light samples are of any use at a lane's vertex.
+    #[inline(always)]
+    pub fn scatters(&self, i: usize) -> bool {
+        match self.scattering[i] {
+            Scattering::Diffuse => !self.reflectance[i].is_black(),
+            Scattering::Metal => true,
+            Scattering::Alone(k) => self.bsdfs[k as usize].flags().is_non_specular(),
+            Scattering::Gone => false,
+        }
+    }
+
+    /// The direction that a lane's path takes, if there is one: drawn in lanes where the vertex is plain.
+    #[inline(always)]
+    pub fn turn(&self, i: usize) -> Option<Turn> {
+        let plain = |weight: SampledSpectrum| Turn {
+            weight,
+            scale: 1.0,
+            wi: self.next_d.vector(i),
+            o: self.next_o.point(i),
+            pdf: self.next_pdf[i],
+            specular: false,
+        };
+        match self.scattering[i] {
+            Scattering::Gone => None,
+            Scattering::Diffuse => {
+                let f = self.reflectance[i] * FRAC_1_PI;
+                (!(f.is_black() || self.next_factor[i] < 0.0)).then(|| plain(f * self.next_factor[i]))
+            }
+            Scattering::Metal => {
+                if self.next_factor[i] < 0.0 {
+                    return None;
+                }
+                let f = self.metal_f(i);
+                (!f.is_black() && f.is_finite()).then(|| plain(f * self.next_factor[i]))
+            }
+            Scattering::Alone(k) => {
+                let (bsdf, wo) = (&self.bsdfs[k as usize], self.at.wo.vector(i));
+                let [_, _, lobe, _] = &self.scatter.0;
+                let sample = bsdf.sample(wo, lobe[i], self.scatter.uv(i), TransportMode::Radiance, Sides::All)?;
+                let (wi, specular) = (sample.wi, sample.lobe.is_specular());
+                Some(Turn {
+                    weight: sample.f * (wi.dot(bsdf.frame.z).abs() / sample.pdf),
+                    scale: if sample.lobe.is_transmissive() { sample.eta * sample.eta } else { 1.0 },
+                    wi,
+                    o: offset_ray_origin(self.at.p.point(i), self.at.p_error.vector(i), self.at.n.normal(i), wi),
+                    pdf: if sample.pdf_is_proportional && !specular {
+                        bsdf.pdf(wo, wi, TransportMode::Radiance, Sides::All)
+                    } else {
+                        sample.pdf
+                    },
+                    specular,
+                })
+            }
+        }
+    }
+
+    /// The path at the vertex of lane `from` goes on its way in lane `to`, with what it carries now; what it meets is not known yet.
+    #[inline(always)]
+    pub fn leave(
+        &mut self,
+        to: usize,
+        from: usize,
+        turn: &Turn,
+        throughput: SampledSpectrum,
+        roulette_scale: f32,
+        scene: &Scene,
+    ) {
+        let [p, p_error, n, ns] = &mut self.previous;
+        p.set(to, self.at.p.point(from).to_array());
+        p_error.set(to, self.at.p_error.vector(from).to_array());
+        n.set(to, self.at.n.normal(from).to_array());
+        ns.set(to, self.at.ns.normal(from).to_array());
+        (self.bsdf_pdf[to], self.specular[to]) = (turn.pdf, turn.specular);
+        (self.throughput[to], self.roulette_scale[to]) = (throughput, roulette_scale);
+        let ray = Ray::new(turn.o, turn.wi, self.time[from]);
+        self.o.set(to, ray.o.to_array());
+        self.d.set(to, ray.d.to_array());
+        (self.time[to], self.rays[to]) = (ray.time, ray);
+        self.streams.shift(to, from);
+        self.sample[to] = self.sample[from];
+        self.escape_place[to] = scene.lights.place_of_escape(turn.wi);
+    }
+}
+
+/// A direction that a path takes from a vertex.
+pub(crate) struct Turn {
+    /// What the throughput is multiplied with: f cos / pdf.
+    pub weight: SampledSpectrum,
+    /// What the scale of roulette is multiplied with.
+    pub scale: f32,
+    /// The direction, unit.
+    pub wi: Vec3,
+    /// Where the ray begins.
+    pub o: Point3,
+    /// The density with which scattering finds the direction, 1/sr.
+    pub pdf: f32,
+    pub specular: bool,
 }

@@ -8,21 +8,23 @@
 //! Only what is common is computed in lanes: flat triangles, diffuse surfaces and rough metals, rectangular lamps. For the rest each vertex is asked alone,
 //! by the functions that [`PathIntegrator::follow`] calls, and its answers are put into the lanes. That loop stays the specification.
 //!
-//! In reading order: this file (the walk), `batch` (what paths carry), `kernels` (the stages in lanes).
+//! In reading order: this file (the walk), `batch` (what paths carry), `kernels` (the stages in lanes), `split` (several light samples at a
+//! vertex), `shared` (what `sharedpath` does otherwise at its first two vertices).
 
 mod batch;
 mod kernels;
+mod shared;
+mod split;
 
-pub(crate) use batch::Batch;
+pub(crate) use batch::{Batch, Plain};
 
 use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
-use crate::light_samples::direct_light;
+use crate::light_samples::{direct_light, strata};
 use crate::path::{PathIntegrator, Roulette, Walk, survival_probability};
 use crate::record::NoRecord;
-use batch::{Plain, Scattering, Surface, nowhere};
-use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::{Bxdf, Diffuse, Sides, TransportMode};
+use batch::{Scattering, Surface, nowhere};
+use irradiant_core::bxdf::{Bxdf, TransportMode};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::geometry::{EmitterShape, Hit};
 use irradiant_core::interaction::{Interaction, LightId};
@@ -31,7 +33,6 @@ use irradiant_core::light_sampler::{LightSampler, PickedLight};
 use irradiant_core::sampler::{SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::LANES;
-use irradiant_math::{Ray, offset_ray_origin};
 use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 use kernels::{Numbers, SampleLamps, Scatter, Surfaces, Weigh};
 use std::f32::consts::FRAC_1_PI;
@@ -39,7 +40,7 @@ use std::f32::consts::FRAC_1_PI;
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
     pub(crate) fn has_stages(&self, scene: &Scene) -> bool {
-        self.light_splits == 1
+        !(self.light_splits > 1 && scene.materials.may_pass())
             && !self.regularize
             && scene.layers.channels() == 0
             && StreamLanes::can_hold(&scene.sampler.stream([0, 0], 0))
@@ -55,21 +56,23 @@ impl PathIntegrator {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
+        let n = b.begin(scene, samples, hits);
+        self.walk_on(b, n, 0, scene, samples, radiance, stats);
+    }
+
+    /// Takes `n` paths of `depth` scattering events each, whose rays are in the lanes with what they meet, to their ends. What they bring is
+    /// added to `radiance`.
+    fn walk_on(
+        &self,
+        b: &mut Batch,
+        mut n: usize,
+        mut depth: u32,
+        scene: &Scene,
+        samples: &mut [CameraSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) {
         let level = scene.geometry.level();
-        let mut n = 0;
-        for (s, sample) in samples.iter().enumerate() {
-            let Some(camera_ray) = &sample.camera_ray else { continue };
-            let ray = &camera_ray.ray;
-            b.o.set(n, ray.o.to_array());
-            b.d.set(n, ray.d.to_array());
-            b.time[n] = ray.time;
-            b.streams.set(n, &sample.stream);
-            b.escape_place[n] = hits[s].map_or_else(|| scene.lights.place_of_escape(ray.d), |_| None);
-            (b.throughput[n], b.roulette_scale[n]) = (SampledSpectrum::ONE, 1.0);
-            (b.met[n], b.sample[n]) = (hits[s], s as u32);
-            n += 1;
-        }
-        let mut depth = 0;
         loop {
             let (stay, n_flat) = self.arrive(b, n, depth, scene, samples, radiance);
             n = stay;
@@ -239,23 +242,45 @@ impl PathIntegrator {
             }
             _ => None,
         };
+        let splits = self.light_splits_at(depth);
+        if strata(scene, splits) > 1 {
+            self.split_light_samples(b, n, depth, splits, scene, samples, radiance, stats);
+            return;
+        }
+        let pick = |b: &Batch, i: usize| {
+            let picked =
+                only.or_else(|| scene.light_sampler.sample(&b.at.reference(i), b.light.light_draws(i).pick))?;
+            Some((picked, picked.pmf, 1.0))
+        };
+        if self.draw_lights(b, n, depth, scene, samples, radiance, stats, pick) {
+            scene.geometry.level().run(Weigh(b, n));
+            self.arriving_light(b, n, scene, radiance, stats);
+        }
+    }
+
+    /// Draws a point of the light that `pick` says for each path, with the average number of its samples there and the share of all
+    /// samples that this one stands for. Whether there is any.
+    fn draw_lights(
+        &self,
+        b: &mut Batch,
+        n: usize,
+        depth: u32,
+        scene: &Scene,
+        samples: &[CameraSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+        pick: impl Fn(&Batch, usize) -> Option<(PickedLight, f32, f32)>,
+    ) -> bool {
         let (sky, mode) = (scene.lights.sky(), SampleMode::Compensated);
         b.light_alone.clear();
         let mut any = false;
         for i in 0..n {
             b.pmf[i] = 0.0;
-            let scatters = match b.scattering[i] {
-                Scattering::Diffuse => !b.reflectance[i].is_black(),
-                Scattering::Metal => true,
-                Scattering::Alone(k) => b.bsdfs[k as usize].flags().is_non_specular(),
-                Scattering::Gone => false,
-            };
-            if !scatters {
+            if !b.scatters(i) {
                 continue;
             }
-            let draws = b.light.light_draws(i);
-            let picked = only.or_else(|| scene.light_sampler.sample(&b.at.reference(i), draws.pick));
-            let Some(picked) = picked else { continue };
+            let Some((picked, times, share)) = pick(b, i) else { continue };
+            (b.light_times[i], b.light_share[i]) = (times, share);
             let PickedLight { id, pmf } = picked;
             if let Light::Area(lamp) = scene.lights.get(id)
                 && let (EmitterShape::Rectangle(rectangle), AreaRadiance::Uniform(emission), AreaAlpha::Constant(alpha)) =
@@ -269,7 +294,7 @@ impl PathIntegrator {
                 (b.pmf[i], b.is_delta[i]) = (pmf, 0);
                 any = true;
             } else {
-                let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(draws.uv, mode));
+                let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(b.light.uv(i), mode));
                 b.light_alone.push((i as u32, picked, line));
             }
         }
@@ -302,10 +327,7 @@ impl PathIntegrator {
             (b.pmf[i], b.is_delta[i]) = (picked.pmf, u32::from(sample.is_delta));
             any = true;
         }
-        if any {
-            level.run(Weigh(b, n));
-            self.arriving_light(b, n, scene, radiance, stats);
-        }
+        any
     }
 
     /// A light sample of one path.
@@ -319,17 +341,10 @@ impl PathIntegrator {
         lambda: &Wavelengths,
         stats: &mut RenderStats,
     ) -> SampledSpectrum {
-        let bsdf = match b.scattering[i] {
-            Scattering::Alone(k) => b.bsdfs[k as usize],
-            Scattering::Metal => Bsdf::new(b.at.frame(i), Bxdf::Conductor(b.metals[i])),
-            Scattering::Diffuse | Scattering::Gone => {
-                Bsdf::new(b.at.frame(i), Bxdf::Diffuse(Diffuse::new(b.reflectance[i])))
-            }
-        };
         direct_light(
             scene,
             &b.interaction(i),
-            &bsdf,
+            &b.bsdf(i),
             &b.throughput[i],
             lambda,
             &b.light.light_draws(i),
@@ -393,49 +408,9 @@ impl PathIntegrator {
     fn go_on(&self, b: &mut Batch, n: usize, depth: u32, scene: &Scene, stats: &mut RenderStats) -> usize {
         let mut stay = 0;
         for i in 0..n {
-            let mut throughput = b.throughput[i];
-            let (mut roulette_scale, mut specular) = (b.roulette_scale[i], false);
-            let (wi, o, bsdf_pdf);
-            match b.scattering[i] {
-                Scattering::Gone => continue,
-                Scattering::Diffuse => {
-                    let f = b.reflectance[i] * FRAC_1_PI;
-                    if f.is_black() || b.next_factor[i] < 0.0 {
-                        continue;
-                    }
-                    throughput *= f * b.next_factor[i];
-                    (wi, o, bsdf_pdf) = (b.next_d.vector(i), b.next_o.point(i), b.next_pdf[i]);
-                }
-                Scattering::Metal => {
-                    if b.next_factor[i] < 0.0 {
-                        continue;
-                    }
-                    let f = b.metal_f(i);
-                    if f.is_black() || !f.is_finite() {
-                        continue;
-                    }
-                    throughput *= f * b.next_factor[i];
-                    (wi, o, bsdf_pdf) = (b.next_d.vector(i), b.next_o.point(i), b.next_pdf[i]);
-                }
-                Scattering::Alone(k) => {
-                    let (bsdf, wo) = (&b.bsdfs[k as usize], b.at.wo.vector(i));
-                    let [_, _, lobe, _] = &b.scatter.0;
-                    let sample = bsdf.sample(wo, lobe[i], b.scatter.uv(i), TransportMode::Radiance, Sides::All);
-                    let Some(sample) = sample else { continue };
-                    throughput *= sample.f * (sample.wi.dot(bsdf.frame.z).abs() / sample.pdf);
-                    specular = sample.lobe.is_specular();
-                    if sample.lobe.is_transmissive() {
-                        roulette_scale *= sample.eta * sample.eta;
-                    }
-                    wi = sample.wi;
-                    o = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
-                    bsdf_pdf = if sample.pdf_is_proportional && !specular {
-                        bsdf.pdf(wo, wi, TransportMode::Radiance, Sides::All)
-                    } else {
-                        sample.pdf
-                    };
-                }
-            }
+            let Some(turn) = b.turn(i) else { continue };
+            let mut throughput = b.throughput[i] * turn.weight;
+            let roulette_scale = b.roulette_scale[i] * turn.scale;
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(depth);
             if throughput.is_black() {
@@ -452,23 +427,10 @@ impl PathIntegrator {
                 throughput *= 1.0 / survival;
             }
             stats.bounce_rays += 1;
-            let [p, p_error, n, ns] = &mut b.previous;
-            p.set(stay, b.at.p.point(i).to_array());
-            p_error.set(stay, b.at.p_error.vector(i).to_array());
-            n.set(stay, b.at.n.normal(i).to_array());
-            ns.set(stay, b.at.ns.normal(i).to_array());
-            (b.bsdf_pdf[stay], b.specular[stay]) = (bsdf_pdf, specular);
-            (b.throughput[stay], b.roulette_scale[stay]) = (throughput, roulette_scale);
-            let ray = Ray::new(o, wi, b.time[i]);
-            b.o.set(stay, ray.o.to_array());
-            b.d.set(stay, ray.d.to_array());
-            b.time[stay] = ray.time;
-            b.streams.shift(stay, i);
-            b.sample[stay] = b.sample[i];
-            b.escape_place[stay] = scene.lights.place_of_escape(wi);
-            b.rays[stay] = ray;
+            b.leave(stay, i, &turn, throughput, roulette_scale, scene);
             stay += 1;
         }
+        b.light_splits = self.light_splits_at(depth - 1);
         scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
         stay
     }

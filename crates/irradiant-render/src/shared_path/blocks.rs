@@ -1,0 +1,377 @@
+//! The vertices of some blocks' paths side by side, and what of their connections is computed in lanes: a block's sixteen first vertices are the
+//! lanes of a loop.
+
+use super::{Incoming, LEAST_ALPHA, PIXELS, Scattered, Second};
+use irradiant_core::bsdf::Bsdf;
+use irradiant_core::bxdf::conductor::mirror_lobe;
+use irradiant_core::bxdf::{Bxdf, Conductor, Ggx, is_usable};
+use irradiant_core::geometry::{Kernel, SurfaceLanes};
+use irradiant_core::interaction::{MaterialId, ReferencePoint};
+use irradiant_math::lanes::LANES;
+use irradiant_math::{Frame, Normal3, Point3, Vec3};
+use irradiant_spectrum::SampledSpectrum;
+use std::f32::consts::FRAC_1_PI;
+
+/// Blocks whose paths go together at most.
+pub(super) const BLOCKS: usize = LANES / PIXELS;
+
+/// What becomes of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// It ends before its first vertex, or there.
+    Nothing,
+    /// It goes apart from its first vertex on, which is of another kind.
+    Apart,
+    /// Its first vertex takes part; it has no second one.
+    First,
+    /// Its first vertex takes part; from its second one on, which is of another kind, it is its pixel's own.
+    Own,
+    /// Its second vertex is shared, light leaves it evenly.
+    Evenly,
+    /// Its second vertex is shared, light leaves it as its BSDF has it.
+    By,
+}
+
+/// One number of each pixel of a block.
+pub(super) type Sixteen = [f32; PIXELS];
+
+/// Three numbers of each.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Three {
+    x: Sixteen,
+    y: Sixteen,
+    z: Sixteen,
+}
+
+impl Three {
+    const ZERO: Self = Self { x: [0.0; PIXELS], y: [0.0; PIXELS], z: [0.0; PIXELS] };
+
+    #[inline(always)]
+    pub fn vector(&self, i: usize) -> Vec3 {
+        Vec3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    #[inline(always)]
+    pub fn point(&self, i: usize) -> Point3 {
+        Point3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    #[inline(always)]
+    fn normal(&self, i: usize) -> Normal3 {
+        Normal3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, [x, y, z]: [f32; 3]) {
+        (self.x[i], self.y[i], self.z[i]) = (x, y, z);
+    }
+}
+
+/// How a first vertex scatters.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Model {
+    /// It takes no part.
+    Nothing,
+    /// Diffusely: f, 1/sr.
+    Diffuse(SampledSpectrum),
+    /// As a rough metal.
+    Metal(Conductor),
+    /// By a model of its own: its place among those of the batch.
+    Alone(u32),
+}
+
+/// The first vertices of a block's paths.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Receivers {
+    p: Three,
+    p_error: Three,
+    n: Three,
+    x: Three,
+    y: Three,
+    z: Three,
+    /// In the frames.
+    wo: Three,
+    alphas: [Sixteen; 2],
+    is_metal: [u32; PIXELS],
+    pub models: [Model; PIXELS],
+    /// What those are made of that are flat triangles.
+    pub materials: [Option<MaterialId>; PIXELS],
+    /// The block's, in the scene's units.
+    pub time: f32,
+}
+
+impl Receivers {
+    const NONE: Self = Self {
+        p: Three::ZERO,
+        p_error: Three::ZERO,
+        n: Three::ZERO,
+        x: Three::ZERO,
+        y: Three::ZERO,
+        z: Three::ZERO,
+        wo: Three::ZERO,
+        alphas: [[1.0; PIXELS]; 2],
+        is_metal: [0; PIXELS],
+        models: [Model::Nothing; PIXELS],
+        materials: [None; PIXELS],
+        time: 0.0,
+    };
+
+    #[inline(always)]
+    fn frame(&self, i: usize) -> Frame {
+        Frame { x: self.x.vector(i), y: self.y.vector(i), z: self.z.vector(i) }
+    }
+}
+
+/// What the paths of some blocks leave for their own pixels and for one another's, by the places of their samples.
+pub(crate) struct Blocks {
+    pub kinds: Vec<Kind>,
+    /// What is the pixel's own.
+    pub own: Vec<SampledSpectrum>,
+    /// Light samples at second vertices.
+    pub direct: Vec<SampledSpectrum>,
+    /// What paths bring after them.
+    pub rest: Vec<SampledSpectrum>,
+    /// Where paths go from shared second vertices whose directions matter.
+    pub next: Vec<Option<Vec3>>,
+    pub(super) receivers: Vec<Receivers>,
+    /// Models of their own, and the directions from which the camera sees them.
+    pub(super) alone: Vec<(Bsdf, Vec3)>,
+    pub seconds: Vec<Option<Second>>,
+    /// What arrives at second vertices; in the end, one's after another's.
+    pub incoming: Vec<(u32, Incoming)>,
+}
+
+impl Blocks {
+    pub(super) fn new() -> Self {
+        Self {
+            kinds: Vec::new(),
+            own: Vec::new(),
+            direct: Vec::new(),
+            rest: Vec::new(),
+            next: Vec::new(),
+            receivers: vec![Receivers::NONE; BLOCKS],
+            alone: Vec::new(),
+            seconds: Vec::new(),
+            incoming: Vec::new(),
+        }
+    }
+
+    /// For the paths of so many samples.
+    pub fn begin(&mut self, samples: usize) {
+        fn fill<T: Clone>(all: &mut Vec<T>, n: usize, value: T) {
+            all.clear();
+            all.resize(n, value);
+        }
+        fill(&mut self.kinds, samples, Kind::Nothing);
+        for sums in [&mut self.own, &mut self.direct, &mut self.rest] {
+            fill(sums, samples, SampledSpectrum::ZERO);
+        }
+        fill(&mut self.next, samples, None);
+        for receivers in &mut self.receivers {
+            receivers.models = [Model::Nothing; PIXELS];
+            receivers.is_metal = [0; PIXELS];
+        }
+        self.alone.clear();
+        self.seconds.clear();
+        self.seconds.resize_with(samples, || None);
+        self.incoming.clear();
+    }
+
+    /// Notes the first vertex of a path: that of lane `i`, and its material if it is that of a flat triangle.
+    pub fn set_first(
+        &mut self,
+        s: usize,
+        at: &SurfaceLanes,
+        i: usize,
+        time: f32,
+        bsdf: Bsdf,
+        material: Option<MaterialId>,
+    ) {
+        let (first, k) = (&mut self.receivers[s / PIXELS], s % PIXELS);
+        first.p.set(k, at.p.point(i).to_array());
+        first.p_error.set(k, at.p_error.vector(i).to_array());
+        first.n.set(k, at.n.normal(i).to_array());
+        first.x.set(k, bsdf.frame.x.to_array());
+        first.y.set(k, bsdf.frame.y.to_array());
+        first.z.set(k, bsdf.frame.z.to_array());
+        let wo = at.wo.vector(i);
+        first.wo.set(k, bsdf.frame.to_local(wo).to_array());
+        (first.materials[k], first.time) = (material, time);
+        first.models[k] = match bsdf.bxdf {
+            Bxdf::Diffuse(diffuse) if diffuse.reflectance.is_finite() => {
+                Model::Diffuse(diffuse.reflectance * FRAC_1_PI)
+            }
+            Bxdf::Conductor(metal) if metal.alpha() >= LEAST_ALPHA => {
+                let [x, y] = metal.facets().alphas();
+                (first.is_metal[k], first.alphas[0][k], first.alphas[1][k]) = (1, x, y);
+                Model::Metal(metal)
+            }
+            _ => {
+                self.alone.push((bsdf, wo));
+                Model::Alone(self.alone.len() as u32 - 1)
+            }
+        };
+    }
+
+    /// When all paths are at their ends: puts together what came at different times.
+    pub fn end(&mut self) {
+        for (s, kind) in self.kinds.iter().enumerate() {
+            match kind {
+                Kind::Nothing | Kind::First => {}
+                Kind::Apart => self.own[s] += self.rest[s],
+                Kind::Own => self.own[s] += self.direct[s] + self.rest[s],
+                Kind::Evenly => {
+                    if let Some(Second { light: Scattered::Evenly { radiance, .. }, .. }) = &mut self.seconds[s] {
+                        *radiance = self.direct[s] + self.rest[s];
+                    }
+                }
+                Kind::By => {
+                    if let Some(wi) = self.next[s] {
+                        let light = Incoming { wi, radiance: self.rest[s], light_pdf: 0.0, found_by_bsdf: true };
+                        self.incoming.push((s as u32, light));
+                    }
+                }
+            }
+        }
+        // Of one vertex in the order in which they came.
+        self.incoming.sort_by_key(|(s, _)| *s);
+        let mut begin = 0;
+        for of_one in self.incoming.chunk_by(|a, b| a.0 == b.0) {
+            let end = begin + of_one.len();
+            if let Some(Second { light: Scattered::By { incoming, .. }, .. }) = &mut self.seconds[of_one[0].0 as usize]
+            {
+                *incoming = begin..end;
+            }
+            begin = end;
+        }
+    }
+}
+
+/// A second vertex as the first vertices of its block see it.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Meeting {
+    /// From the first ones to the second.
+    pub wi: Three,
+    /// cos / r^2 at the second: from density per solid angle to density per area.
+    pub there: Sixteen,
+    /// The cosine at the first.
+    pub cosine: Sixteen,
+    /// Density with which the first one's BSDF finds the second, 1/sr; 0 where it does not. Not of models of their own.
+    pub pdf: Sixteen,
+    /// Of metals: cosine with the facet, value without Fresnel.
+    pub lobe: [Sixteen; 2],
+    /// 1 where light leaves the second vertex this way.
+    pub leaves: [u32; PIXELS],
+    /// The segment from the first to the second.
+    pub o: Three,
+    pub d: Three,
+}
+
+impl Meeting {
+    pub const NONE: Self = Self {
+        wi: Three::ZERO,
+        there: [0.0; PIXELS],
+        cosine: [0.0; PIXELS],
+        pdf: [0.0; PIXELS],
+        lobe: [[0.0; PIXELS]; 2],
+        leaves: [0; PIXELS],
+        o: Three::ZERO,
+        d: Three::ZERO,
+    };
+}
+
+/// All first vertices of a block meet one second vertex.
+pub(super) struct Meet<'a> {
+    pub receivers: &'a Receivers,
+    pub place: &'a ReferencePoint,
+    /// The normal on the only side that light leaves, if there is one.
+    pub side: Option<Vec3>,
+    pub out: &'a mut Meeting,
+}
+
+impl Kernel for Meet<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self { receivers: r, place, side, out } = self;
+        let ReferencePoint { p, p_error, n, .. } = *place;
+        let (has_side, side) = (side.is_some(), side.unwrap_or(Vec3::ZERO));
+        for i in 0..PIXELS {
+            let d = p - r.p.point(i);
+            let r2 = d.length_squared();
+            let wi = d * (1.0 / r2.sqrt());
+            let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(wi));
+            let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
+            out.wi.set(i, wi.to_array());
+            out.there[i] = wi.dot_normal(n).abs() / r2;
+            out.cosine[i] = wi.dot(r.z.vector(i)).abs();
+            out.pdf[i] = if scatters { local_i.z.abs() * FRAC_1_PI } else { 0.0 };
+            out.leaves[i] = u32::from(!has_side | (wi.dot(side) < 0.0));
+        }
+        for i in 0..PIXELS {
+            let from =
+                ReferencePoint { p: r.p.point(i), p_error: r.p_error.vector(i), n: r.n.normal(i), ns: Normal3::ZERO };
+            let ray = from.spawn_ray_to(p, p_error, n, 0.0);
+            out.o.set(i, ray.o.to_array());
+            out.d.set(i, ray.d.to_array());
+        }
+        if r.is_metal.iter().fold(0, |any, metal| any | metal) == 0 {
+            return;
+        }
+        for i in 0..PIXELS {
+            let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(out.wi.vector(i)));
+            let (lobe, is_lit) = mirror_lobe(&Ggx::new(r.alphas[0][i], r.alphas[1][i]), local_o, local_i);
+            let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+            let pdf = if scatters { lobe.pdf } else { 0.0 };
+            out.pdf[i] = if r.is_metal[i] != 0 { pdf } else { out.pdf[i] };
+            (out.lobe[0][i], out.lobe[1][i]) = (lobe.cos, lobe.value);
+        }
+    }
+}
+
+/// A metal's lobes for light from one direction, for each of those that see it.
+pub(super) struct Mirror<'a> {
+    pub frame: &'a Frame,
+    pub facets: Ggx,
+    pub wi: Vec3,
+    /// Towards those who see it, unit.
+    pub wo: &'a Three,
+    pub out: &'a mut Lobes,
+}
+
+/// Their cosines with the facet, values without Fresnel, and densities; both 0 where nothing is scattered.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Lobes {
+    pub cos: Sixteen,
+    pub value: Sixteen,
+    pub pdf: Sixteen,
+}
+
+impl Lobes {
+    pub const NONE: Self = Self { cos: [0.0; PIXELS], value: [0.0; PIXELS], pdf: [0.0; PIXELS] };
+}
+
+impl Kernel for Mirror<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self { frame, facets, wi, wo, out } = self;
+        let local_i = frame.to_local(wi);
+        let i_is_usable = is_usable(local_i);
+        for i in 0..PIXELS {
+            let local_o = frame.to_local(wo.vector(i));
+            let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
+            let scatters = is_usable(local_o) & i_is_usable & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+            out.cos[i] = lobe.cos;
+            out.value[i] = if scatters { lobe.value } else { 0.0 };
+            out.pdf[i] = if scatters { lobe.pdf } else { 0.0 };
+        }
+    }
+}
+
+/// Directions that are not set.
+pub(super) const NOWHERE: Three = Three { z: [1.0; PIXELS], ..Three::ZERO };

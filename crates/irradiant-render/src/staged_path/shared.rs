@@ -1,0 +1,313 @@
+//! What [`sharedpath`](crate::shared_path) does otherwise at the first two vertices of its paths, many paths at a time. Between these vertices
+//! and after them its paths go by the common stages.
+
+use super::batch::{Batch, Scattering, Surface};
+use super::kernels::{Numbers, Scatter, Surfaces, Weigh};
+use crate::camera_samples::CameraSample;
+use crate::integrator::RenderStats;
+use crate::path::{PathIntegrator, survival_probability};
+use crate::shared_path::blocks::{Blocks, Kind};
+use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, Scattered, Second, gains, is_shared};
+use irradiant_core::bxdf::Bxdf;
+use irradiant_core::geometry::Hit;
+use irradiant_core::scene::Scene;
+use irradiant_math::Vec3;
+use irradiant_math::lanes::LANES;
+use irradiant_spectrum::SampledSpectrum;
+
+impl Batch {
+    /// Whether a lane's vertex can be shared.
+    fn is_shared(&self, i: usize) -> bool {
+        match self.scattering[i] {
+            Scattering::Diffuse | Scattering::Metal => true,
+            Scattering::Alone(k) => is_shared(&self.bsdfs[k as usize]),
+            Scattering::Gone => false,
+        }
+    }
+
+    /// Whether a lane's vertex, the first of its path, gains from what its neighbours' paths find.
+    fn gains(&self, i: usize) -> bool {
+        match self.scattering[i] {
+            Scattering::Diffuse => true,
+            Scattering::Metal => !(self.metals[i].alpha() < LEAST_ALPHA),
+            Scattering::Alone(k) => gains(&self.bsdfs[k as usize]),
+            Scattering::Gone => false,
+        }
+    }
+
+    /// Whether light that leaves a lane's vertex is the same in all directions of one side.
+    fn is_even(&self, i: usize) -> bool {
+        match self.scattering[i] {
+            Scattering::Diffuse => true,
+            Scattering::Alone(k) => matches!(self.bsdfs[k as usize].bxdf, Bxdf::Diffuse(_)),
+            Scattering::Metal | Scattering::Gone => false,
+        }
+    }
+}
+
+impl PathIntegrator {
+    /// The paths of some blocks, whose camera rays' hits are known: what they bring to their own pixels, their first vertices and their second
+    /// ones are left in `blocks`.
+    pub(crate) fn shared_batch(
+        &self,
+        b: &mut Batch,
+        scene: &Scene,
+        samples: &mut [CameraSample],
+        hits: &[Option<Hit>],
+        blocks: &mut Blocks,
+        stats: &mut RenderStats,
+    ) {
+        let level = scene.geometry.level();
+        blocks.begin(samples.len());
+
+        // First vertices.
+        let n = b.begin(scene, samples, hits);
+        let (n, n_flat) = self.arrive(b, n, 0, scene, samples, &mut blocks.own);
+        if n_flat > 0 {
+            level.run(Surfaces(b, n));
+        }
+        self.shade(b, n, 0, scene, samples, &mut blocks.own, stats);
+        if self.is_at_limit(0) || n == 0 {
+            return;
+        }
+        level.run(Numbers(b, n, 0));
+        self.light_samples(b, n, 0, scene, samples, &mut blocks.own, stats);
+        level.run(Scatter(b, n));
+        for i in 0..n {
+            let s = b.sample[i] as usize;
+            blocks.kinds[s] = if b.gains(i) {
+                let material = match b.surface[i] {
+                    Surface::Flat(material, _) => Some(material),
+                    Surface::Other => None,
+                };
+                blocks.set_first(s, &b.at, i, b.time[i], b.bsdf(i), material);
+                Kind::First
+            } else {
+                Kind::Apart
+            };
+        }
+        let n = self.leave_first(b, n, scene, blocks, stats);
+
+        // Second vertices. What paths bring that are apart from here on is a sum of its own.
+        for (s, kind) in blocks.kinds.iter().enumerate() {
+            blocks.rest[s] = if *kind == Kind::Apart { SampledSpectrum::ZERO } else { blocks.own[s] };
+        }
+        let (n, n_flat) = self.arrive(b, n, 1, scene, samples, &mut blocks.rest);
+        if n_flat > 0 {
+            level.run(Surfaces(b, n));
+        }
+        self.shade(b, n, 1, scene, samples, &mut blocks.rest, stats);
+        for (s, kind) in blocks.kinds.iter().enumerate() {
+            if *kind != Kind::Apart {
+                blocks.own[s] = std::mem::replace(&mut blocks.rest[s], SampledSpectrum::ZERO);
+            }
+        }
+        if !self.is_at_limit(1) && n > 0 {
+            self.share_second(b, n, blocks);
+            level.run(Numbers(b, n, 1));
+            self.light_at_second(b, n, scene, samples, blocks, stats);
+            level.run(Scatter(b, n));
+            for (s, kind) in blocks.kinds.iter().enumerate() {
+                if *kind != Kind::Apart {
+                    blocks.direct[s] = std::mem::replace(&mut blocks.rest[s], SampledSpectrum::ZERO);
+                }
+            }
+            let n = self.leave_second(b, n, scene, samples, blocks, stats);
+            self.walk_on(b, n, 2, scene, samples, &mut blocks.rest, stats);
+        }
+        blocks.end();
+    }
+
+    /// Traces the rays of paths that leave their first vertices. How many do.
+    fn leave_first(
+        &self,
+        b: &mut Batch,
+        n: usize,
+        scene: &Scene,
+        blocks: &mut Blocks,
+        stats: &mut RenderStats,
+    ) -> usize {
+        let mut stay = 0;
+        for i in 0..n {
+            let Some(turn) = b.turn(i) else { continue };
+            let s = b.sample[i] as usize;
+            let (throughput, scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
+            stats.scatterings += 1;
+            stats.longest_path = stats.longest_path.max(1);
+            // What is of no use to its own pixel is of use to others. Roulette ends no path here.
+            if throughput.is_black() && blocks.kinds[s] == Kind::Apart {
+                continue;
+            }
+            stats.bounce_rays += 1;
+            b.leave(stay, i, &turn, throughput, scale, scene);
+            stay += 1;
+        }
+        b.light_splits = self.light_splits_at(0);
+        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
+        stay
+    }
+
+    /// Notes second vertices that can be shared, and from there counts light as it leaves them.
+    fn share_second(&self, b: &mut Batch, n: usize, blocks: &mut Blocks) {
+        for i in 0..n {
+            let s = b.sample[i] as usize;
+            if blocks.kinds[s] != Kind::First || b.scattering[i] == Scattering::Gone {
+                continue;
+            }
+            let carried = b.throughput[i];
+            if !b.is_shared(i) {
+                blocks.kinds[s] = Kind::Own;
+                if carried.is_black() {
+                    b.scattering[i] = Scattering::Gone;
+                }
+                continue;
+            }
+            b.roulette_scale[i] = carried.max_component().max(LEAST_IMPORTANCE);
+            b.throughput[i] = SampledSpectrum::ONE;
+            let wo = b.at.wo.vector(i);
+            let light = if b.is_even(i) {
+                blocks.kinds[s] = Kind::Evenly;
+                let z = match b.scattering[i] {
+                    Scattering::Alone(k) => b.bsdfs[k as usize].frame.z,
+                    _ => b.at.z.vector(i),
+                };
+                Scattered::Evenly { normal: z * 1f32.copysign(wo.dot(z)), radiance: SampledSpectrum::ZERO }
+            } else {
+                blocks.kinds[s] = Kind::By;
+                Scattered::By { bsdf: b.bsdf(i), incoming: 0..0 }
+            };
+            blocks.seconds[s] = Some(Second { place: b.at.reference(i), wo, pdf: b.bsdf_pdf[i], carried, light });
+        }
+    }
+
+    /// Light samples at second vertices: where the directions matter from which they are seen, what arrives.
+    fn light_at_second(
+        &self,
+        b: &mut Batch,
+        n: usize,
+        scene: &Scene,
+        samples: &[CameraSample],
+        blocks: &mut Blocks,
+        stats: &mut RenderStats,
+    ) {
+        let pick = |b: &Batch, i: usize| {
+            let picked = scene.light_sampler.sample(&b.at.reference(i), b.light.light_draws(i).pick)?;
+            Some((picked, picked.pmf, 1.0))
+        };
+        if !self.draw_lights(b, n, 1, scene, samples, &mut blocks.rest, stats, pick) {
+            return;
+        }
+        scene.geometry.level().run(Weigh(b, n));
+        b.shadow_rays.clear();
+        b.shadow_ends.clear();
+        let begin = blocks.incoming.len();
+        for i in 0..n {
+            let s = b.sample[i];
+            if blocks.kinds[s as usize] != Kind::By {
+                continue;
+            }
+            let pmf = std::mem::take(&mut b.pmf[i]);
+            if pmf == 0.0 || b.targets.pdf[i] == 0.0 || b.arriving[i].is_black() {
+                continue;
+            }
+            let (ray, end) = b.targets.ray(i, b.time[i]);
+            b.shadow_rays.push(ray);
+            b.shadow_ends.push(end);
+            let incoming = Incoming {
+                wi: b.targets.wi.vector(i),
+                radiance: b.arriving[i],
+                light_pdf: pmf * b.targets.pdf[i],
+                found_by_bsdf: b.is_delta[i] == 0,
+            };
+            blocks.incoming.push((s, incoming));
+        }
+        stats.shadow_rays += b.shadow_rays.len() as u64;
+        let mut occluded = [false; LANES];
+        let occluded = &mut occluded[..b.shadow_rays.len()];
+        scene.geometry.occluded_batch(&b.shadow_rays, &b.shadow_ends, &scene.alpha(), occluded);
+        let mut stay = begin;
+        for (k, occluded) in occluded.iter().enumerate() {
+            if !*occluded {
+                blocks.incoming.swap(stay, begin + k);
+                stay += 1;
+            }
+        }
+        blocks.incoming.truncate(stay);
+        self.arriving_light(b, n, scene, &mut blocks.rest, stats);
+    }
+
+    /// Plays roulette at second vertices, traces the rays of paths that go on, and asks what those of lamps see that others see by BSDFs. How
+    /// many go on.
+    fn leave_second(
+        &self,
+        b: &mut Batch,
+        n: usize,
+        scene: &Scene,
+        samples: &[CameraSample],
+        blocks: &mut Blocks,
+        stats: &mut RenderStats,
+    ) -> usize {
+        let mut stay = 0;
+        for i in 0..n {
+            let Some(turn) = b.turn(i) else { continue };
+            let s = b.sample[i] as usize;
+            let (mut throughput, mut scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
+            stats.scatterings += 1;
+            stats.longest_path = stats.longest_path.max(2);
+            if blocks.kinds[s] == Kind::By {
+                // By one number, not by colours, and never to nothing: others see the surface from elsewhere.
+                scale *= throughput.max_component().max(LEAST_IMPORTANCE);
+                let survival = survival_probability(&SampledSpectrum::splat(scale), 1.0, 2);
+                if b.scatter.roulette(i) >= survival {
+                    continue;
+                }
+                throughput = SampledSpectrum::splat(1.0 / survival);
+                blocks.next[s] = Some(turn.wi);
+            } else {
+                if throughput.is_black() {
+                    continue;
+                }
+                let survival = survival_probability(&throughput, scale, 2);
+                if survival < 1.0 {
+                    if b.scatter.roulette(i) >= survival {
+                        continue;
+                    }
+                    throughput *= 1.0 / survival;
+                }
+            }
+            stats.bounce_rays += 1;
+            b.leave(stay, i, &turn, throughput, scale, scene);
+            stay += 1;
+        }
+        b.light_splits = 1;
+        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
+        for i in 0..stay {
+            let s = b.sample[i] as usize;
+            if blocks.kinds[s] == Kind::By {
+                // As in `SharedPathIntegrator::incoming`: first with any density of the direction, then with none.
+                (b.bsdf_pdf[i], b.specular[i]) = (1.0, false);
+                self.lamps_seen(b, i, scene, &samples[s], b.d.vector(i), blocks);
+                b.bsdf_pdf[i] = 0.0;
+            }
+        }
+        stay
+    }
+
+    /// What the ray of a lane sees of lamps that light samples find too.
+    fn lamps_seen(&self, b: &mut Batch, i: usize, scene: &Scene, sample: &CameraSample, wi: Vec3, blocks: &mut Blocks) {
+        let s = b.sample[i];
+        let mut lamps = Lamps(wi, |light| blocks.incoming.push((s, light)));
+        let Some(hit) = b.met[i] else {
+            self.escaped(scene, &b.walk(i, 2), &sample.lambda, &mut lamps);
+            return;
+        };
+        // Most surfaces are no lamps.
+        if let Some((_, None)) = scene.geometry.flat_triangle(&hit, &mut b.triangles, i) {
+            return;
+        }
+        let met = scene.geometry.interaction(&b.ray(i), &hit);
+        if met.light.is_some() {
+            self.emitted(scene, &b.walk(i, 2), &met, &sample.lambda, &mut lamps);
+        }
+    }
+}
