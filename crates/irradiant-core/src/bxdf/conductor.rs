@@ -89,6 +89,12 @@ impl Conductor {
         self.facets
     }
 
+    /// Its index, `eta + i k`, relative to the outside.
+    #[inline]
+    pub fn index(&self) -> (SampledSpectrum, SampledSpectrum) {
+        (self.eta, self.k)
+    }
+
     /// The fraction reflected by a facet at this angle, per lane.
     #[inline]
     pub fn fresnel(&self, cos_i: f32) -> SampledSpectrum {

@@ -57,22 +57,28 @@ pub fn fresnel_dielectric(cos_i: f32, eta: f32) -> f32 {
 /// `cos_i` in [0, 1], from the facet normal.
 #[inline]
 pub fn fresnel_conductor(cos_i: f32, eta: SampledSpectrum, k: SampledSpectrum) -> SampledSpectrum {
+    let mut out = [0.0; 4];
+    for (lane, value) in out.iter_mut().enumerate() {
+        *value = fresnel_conductor_at(cos_i, eta.0[lane], k.0[lane]);
+    }
+    SampledSpectrum(out)
+}
+
+/// As [`fresnel_conductor`], of one lane.
+#[inline(always)]
+pub fn fresnel_conductor_at(cos_i: f32, eta: f32, k: f32) -> f32 {
     let cos_i = cos_i.clamp(0.0, 1.0);
     let cos2 = cos_i * cos_i;
     let sin2 = 1.0 - cos2;
-    let mut out = [0.0; 4];
-    for (lane, value) in out.iter_mut().enumerate() {
-        let (eta2, k2) = (eta.0[lane] * eta.0[lane], k.0[lane] * k.0[lane]);
-        // (a + i b)^2 = (eta + i k)^2 - sin^2: a cos-like pair inside the metal.
-        let t = eta2 - k2 - sin2;
-        let a2_plus_b2 = (t * t + 4.0 * eta2 * k2).sqrt();
-        let a = (0.5 * (a2_plus_b2 + t)).max(0.0).sqrt();
-        let (p, q) = (a2_plus_b2 + cos2, 2.0 * cos_i * a);
-        let perpendicular = (p - q) / (p + q);
-        let (p, q) = (cos2 * a2_plus_b2 + sin2 * sin2, q * sin2);
-        *value = 0.5 * perpendicular * (1.0 + (p - q) / (p + q));
-    }
-    SampledSpectrum(out)
+    let (eta2, k2) = (eta * eta, k * k);
+    // (a + i b)^2 = (eta + i k)^2 - sin^2: a cos-like pair inside the metal.
+    let t = eta2 - k2 - sin2;
+    let a2_plus_b2 = (t * t + 4.0 * eta2 * k2).sqrt();
+    let a = (0.5 * (a2_plus_b2 + t)).max(0.0).sqrt();
+    let (p, q) = (a2_plus_b2 + cos2, 2.0 * cos_i * a);
+    let perpendicular = (p - q) / (p + q);
+    let (p, q) = (cos2 * a2_plus_b2 + sin2 * sin2, q * sin2);
+    0.5 * perpendicular * (1.0 + (p - q) / (p + q))
 }
 
 /// One transparent film on an opaque base: its reflectance interferes, so it depends on wavelength and angle.

@@ -4,12 +4,13 @@
 use super::{Incoming, LEAST_ALPHA, PIXELS, Scattered, Second};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::mirror_lobe;
+use irradiant_core::bxdf::fresnel::fresnel_conductor_at;
 use irradiant_core::bxdf::{Bxdf, Conductor, Ggx, is_usable};
 use irradiant_core::geometry::{Kernel, SurfaceLanes};
 use irradiant_core::interaction::{MaterialId, ReferencePoint};
 use irradiant_math::lanes::LANES;
 use irradiant_math::{Frame, Normal3, Point3, Vec3};
-use irradiant_spectrum::SampledSpectrum;
+use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum};
 use std::f32::consts::FRAC_1_PI;
 
 /// Blocks whose paths go together at most.
@@ -68,15 +69,27 @@ impl Three {
     }
 }
 
+/// One spectrum of each: a row for each wavelength.
+pub(super) type Spectra = [Sixteen; N_WAVELENGTHS];
+
+/// A lane's spectrum.
+#[inline(always)]
+pub(super) fn spectrum(of: &Spectra, i: usize) -> SampledSpectrum {
+    SampledSpectrum(std::array::from_fn(|k| of[k][i]))
+}
+
+#[inline(always)]
+pub(super) fn set_spectrum(of: &mut Spectra, i: usize, value: SampledSpectrum) {
+    (0..N_WAVELENGTHS).for_each(|k| of[k][i] = value.0[k]);
+}
+
 /// How a first vertex scatters.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Model {
     /// It takes no part.
     Nothing,
-    /// Diffusely: f, 1/sr.
-    Diffuse(SampledSpectrum),
-    /// As a rough metal.
-    Metal(Conductor),
+    /// Diffusely or as a rough metal, by the numbers of its lane.
+    Plain,
     /// By a model of its own: its place among those of the batch.
     Alone(u32),
 }
@@ -93,8 +106,14 @@ pub(super) struct Receivers {
     z: Three,
     /// In the frames.
     wo: Three,
+    /// Of diffuse ones, 1/sr.
+    f: Spectra,
+    /// Of metals.
     alphas: [Sixteen; 2],
+    eta: Spectra,
+    k: Spectra,
     is_metal: [u32; PIXELS],
+    is_plain: [u32; PIXELS],
     pub models: [Model; PIXELS],
     /// What those are made of that are flat triangles.
     pub materials: [Option<MaterialId>; PIXELS],
@@ -111,8 +130,12 @@ impl Receivers {
         y: Three::ZERO,
         z: Three::ZERO,
         wo: Three::ZERO,
+        f: [[0.0; PIXELS]; N_WAVELENGTHS],
         alphas: [[1.0; PIXELS]; 2],
+        eta: [[1.0; PIXELS]; N_WAVELENGTHS],
+        k: [[1.0; PIXELS]; N_WAVELENGTHS],
         is_metal: [0; PIXELS],
+        is_plain: [0; PIXELS],
         models: [Model::Nothing; PIXELS],
         materials: [None; PIXELS],
         time: 0.0,
@@ -122,8 +145,19 @@ impl Receivers {
     fn frame(&self, i: usize) -> Frame {
         Frame { x: self.x.vector(i), y: self.y.vector(i), z: self.z.vector(i) }
     }
-}
 
+    /// At the wavelengths of a path.
+    pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
+        set_spectrum(&mut self.f, i, reflectance * FRAC_1_PI);
+    }
+
+    /// At the wavelengths of a path.
+    pub fn set_metal(&mut self, i: usize, metal: &Conductor) {
+        let (eta, k) = metal.index();
+        set_spectrum(&mut self.eta, i, eta);
+        set_spectrum(&mut self.k, i, k);
+    }
+}
 /// What the paths of some blocks leave for their own pixels and for one another's, by the places of their samples.
 pub(crate) struct Blocks {
     pub kinds: Vec<Kind>,
@@ -171,7 +205,7 @@ impl Blocks {
         fill(&mut self.next, samples, None);
         for receivers in &mut self.receivers {
             receivers.models = [Model::Nothing; PIXELS];
-            receivers.is_metal = [0; PIXELS];
+            (receivers.is_metal, receivers.is_plain) = ([0; PIXELS], [0; PIXELS]);
         }
         self.alone.clear();
         self.seconds.clear();
@@ -200,13 +234,17 @@ impl Blocks {
         first.wo.set(k, bsdf.frame.to_local(wo).to_array());
         (first.materials[k], first.time) = (material, time);
         first.models[k] = match bsdf.bxdf {
-            Bxdf::Diffuse(diffuse) if diffuse.reflectance.is_finite() => {
-                Model::Diffuse(diffuse.reflectance * FRAC_1_PI)
+            Bxdf::Diffuse(diffuse) => {
+                first.set_diffuse(k, diffuse.reflectance);
+                first.is_plain[k] = 1;
+                Model::Plain
             }
             Bxdf::Conductor(metal) if metal.alpha() >= LEAST_ALPHA => {
                 let [x, y] = metal.facets().alphas();
-                (first.is_metal[k], first.alphas[0][k], first.alphas[1][k]) = (1, x, y);
-                Model::Metal(metal)
+                (first.alphas[0][k], first.alphas[1][k]) = (x, y);
+                first.set_metal(k, &metal);
+                (first.is_plain[k], first.is_metal[k]) = (1, 1);
+                Model::Plain
             }
             _ => {
                 self.alone.push((bsdf, wo));
@@ -253,18 +291,18 @@ impl Blocks {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Meeting {
-    /// From the first ones to the second.
-    pub wi: Three,
+    /// From the second to the first ones.
+    pub wo: Three,
     /// cos / r^2 at the second: from density per solid angle to density per area.
     pub there: Sixteen,
-    /// The cosine at the first.
-    pub cosine: Sixteen,
-    /// Density with which the first one's BSDF finds the second, 1/sr; 0 where it does not. Not of models of their own.
+    /// Density with which a first one's BSDF finds the second, per area.
     pub pdf: Sixteen,
-    /// Of metals: cosine with the facet, value without Fresnel.
-    pub lobe: [Sixteen; 2],
+    /// What the light of the second is multiplied with on its way along the first to the camera.
+    pub f: Spectra,
     /// 1 where light leaves the second vertex this way.
     pub leaves: [u32; PIXELS],
+    /// Not 0 where light is scattered so, and not yet known to be blocked.
+    pub is_joined: [u32; PIXELS],
     /// The segment from the first to the second.
     pub o: Three,
     pub d: Three,
@@ -272,18 +310,26 @@ pub(super) struct Meeting {
 
 impl Meeting {
     pub const NONE: Self = Self {
-        wi: Three::ZERO,
+        wo: Three::ZERO,
         there: [0.0; PIXELS],
-        cosine: [0.0; PIXELS],
         pdf: [0.0; PIXELS],
-        lobe: [[0.0; PIXELS]; 2],
+        f: [[0.0; PIXELS]; N_WAVELENGTHS],
         leaves: [0; PIXELS],
+        is_joined: [0; PIXELS],
         o: Three::ZERO,
         d: Three::ZERO,
     };
+
+    /// Sets a lane: what is scattered, with the cosine at the first vertex, and its density, 1/sr.
+    pub fn set(&mut self, i: usize, f_cos: SampledSpectrum, pdf: f32) {
+        let pdf = pdf * self.there[i];
+        self.is_joined[i] = u32::from(pdf > 0.0 && pdf.is_finite() && !f_cos.is_black());
+        self.pdf[i] = pdf;
+        set_spectrum(&mut self.f, i, f_cos * self.there[i]);
+    }
 }
 
-/// All first vertices of a block meet one second vertex.
+/// All first vertices of a block meet one second vertex. Models of their own are still to be asked.
 pub(super) struct Meet<'a> {
     pub receivers: &'a Receivers,
     pub place: &'a ReferencePoint,
@@ -299,16 +345,17 @@ impl Kernel for Meet<'_> {
         let Self { receivers: r, place, side, out } = self;
         let ReferencePoint { p, p_error, n, .. } = *place;
         let (has_side, side) = (side.is_some(), side.unwrap_or(Vec3::ZERO));
+        let (mut cosine, mut pdf) = ([0.0; PIXELS], [0.0; PIXELS]);
         for i in 0..PIXELS {
             let d = p - r.p.point(i);
             let r2 = d.length_squared();
             let wi = d * (1.0 / r2.sqrt());
             let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(wi));
             let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
-            out.wi.set(i, wi.to_array());
+            out.wo.set(i, (-wi).to_array());
             out.there[i] = wi.dot_normal(n).abs() / r2;
-            out.cosine[i] = wi.dot(r.z.vector(i)).abs();
-            out.pdf[i] = if scatters { local_i.z.abs() * FRAC_1_PI } else { 0.0 };
+            cosine[i] = wi.dot(r.z.vector(i)).abs();
+            pdf[i] = if scatters { local_i.z.abs() * FRAC_1_PI } else { 0.0 };
             out.leaves[i] = u32::from(!has_side | (wi.dot(side) < 0.0));
         }
         for i in 0..PIXELS {
@@ -318,60 +365,144 @@ impl Kernel for Meet<'_> {
             out.o.set(i, ray.o.to_array());
             out.d.set(i, ray.d.to_array());
         }
-        if r.is_metal.iter().fold(0, |any, metal| any | metal) == 0 {
-            return;
+        out.f = r.f;
+        if r.is_metal.iter().fold(0, |any, metal| any | metal) != 0 {
+            let (mut facet, mut value) = ([0.0; PIXELS], [0.0; PIXELS]);
+            for i in 0..PIXELS {
+                let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(-out.wo.vector(i)));
+                let (lobe, is_lit) = mirror_lobe(&Ggx::new(r.alphas[0][i], r.alphas[1][i]), local_o, local_i);
+                let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+                let found = if scatters { lobe.pdf } else { 0.0 };
+                pdf[i] = if r.is_metal[i] != 0 { found } else { pdf[i] };
+                (facet[i], value[i]) = (lobe.cos, lobe.value);
+            }
+            for k in 0..N_WAVELENGTHS {
+                for i in 0..PIXELS {
+                    let f = fresnel_conductor_at(facet[i], r.eta[k][i], r.k[k][i]) * value[i];
+                    out.f[k][i] = if r.is_metal[i] != 0 { f } else { out.f[k][i] };
+                }
+            }
+        }
+        let (mut is_black, mut is_finite) = ([1; PIXELS], [1; PIXELS]);
+        for k in 0..N_WAVELENGTHS {
+            for i in 0..PIXELS {
+                is_finite[i] &= u32::from(out.f[k][i].abs() < f32::INFINITY);
+                let f_cos = out.f[k][i] * cosine[i];
+                is_black[i] &= u32::from(f_cos == 0.0);
+                out.f[k][i] = f_cos * out.there[i];
+            }
         }
         for i in 0..PIXELS {
-            let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(out.wi.vector(i)));
-            let (lobe, is_lit) = mirror_lobe(&Ggx::new(r.alphas[0][i], r.alphas[1][i]), local_o, local_i);
-            let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
-            let pdf = if scatters { lobe.pdf } else { 0.0 };
-            out.pdf[i] = if r.is_metal[i] != 0 { pdf } else { out.pdf[i] };
-            (out.lobe[0][i], out.lobe[1][i]) = (lobe.cos, lobe.value);
+            let pdf = pdf[i] * out.there[i];
+            // Directions in which nothing is scattered are never drawn.
+            let is_joined = (pdf > 0.0) & (pdf < f32::INFINITY) & (is_black[i] == 0);
+            out.is_joined[i] = u32::from(is_joined) & is_finite[i] & r.is_plain[i] & out.leaves[i];
+            out.pdf[i] = pdf;
         }
     }
 }
 
-/// A metal's lobes for light from one direction, for each of those that see it.
-pub(super) struct Mirror<'a> {
-    pub frame: &'a Frame,
-    pub facets: Ggx,
-    pub wi: Vec3,
-    /// Towards those who see it, unit.
-    pub wo: &'a Three,
-    pub out: &'a mut Lobes,
+/// What a second vertex gives to each first one of its block that is joined to it: radiance that reaches the camera.
+pub(super) struct GiveEvenly<'a> {
+    pub meeting: &'a Meeting,
+    pub radiance: SampledSpectrum,
+    pub out: &'a mut Spectra,
 }
 
-/// Their cosines with the facet, values without Fresnel, and densities; both 0 where nothing is scattered.
-#[derive(Clone, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Lobes {
-    pub cos: Sixteen,
-    pub value: Sixteen,
-    pub pdf: Sixteen,
-}
-
-impl Lobes {
-    pub const NONE: Self = Self { cos: [0.0; PIXELS], value: [0.0; PIXELS], pdf: [0.0; PIXELS] };
-}
-
-impl Kernel for Mirror<'_> {
+impl Kernel for GiveEvenly<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self { frame, facets, wi, wo, out } = self;
-        let local_i = frame.to_local(wi);
-        let i_is_usable = is_usable(local_i);
+        let Self { meeting: m, radiance, out } = self;
+        let mut total = 0.0;
         for i in 0..PIXELS {
-            let local_o = frame.to_local(wo.vector(i));
-            let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
-            let scatters = is_usable(local_o) & i_is_usable & is_lit & (lobe.pdf.abs() < f32::INFINITY);
-            out.cos[i] = lobe.cos;
-            out.value[i] = if scatters { lobe.value } else { 0.0 };
-            out.pdf[i] = if scatters { lobe.pdf } else { 0.0 };
+            total += if m.is_joined[i] != 0 { m.pdf[i] } else { 0.0 };
+        }
+        let share = 1.0 / total;
+        for k in 0..N_WAVELENGTHS {
+            for i in 0..PIXELS {
+                let given = m.f[k][i] * radiance.0[k] * share;
+                out[k][i] = if m.is_joined[i] != 0 { given } else { 0.0 };
+            }
         }
     }
 }
 
-/// Directions that are not set.
-pub(super) const NOWHERE: Three = Three { z: [1.0; PIXELS], ..Three::ZERO };
+/// As [`GiveEvenly`], of one light that arrives at a metal; nothing where it finds no way to it.
+pub(super) struct GiveByMetal<'a> {
+    pub meeting: &'a Meeting,
+    pub frame: &'a Frame,
+    pub metal: &'a Conductor,
+    pub light: &'a Incoming,
+    pub out: &'a mut Spectra,
+}
+
+impl Kernel for GiveByMetal<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self { meeting: m, frame, metal, light, out } = self;
+        let facets = metal.facets();
+        let (eta, k) = metal.index();
+        let local_i = frame.to_local(light.wi);
+        let i_is_usable = is_usable(local_i);
+        let (mut facet, mut value, mut pdf) = ([0.0; PIXELS], [0.0; PIXELS], [0.0; PIXELS]);
+        for i in 0..PIXELS {
+            let local_o = frame.to_local(m.wo.vector(i));
+            let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
+            let scatters = is_usable(local_o) & i_is_usable & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+            facet[i] = lobe.cos;
+            value[i] = lobe.value;
+            pdf[i] = if scatters & (m.is_joined[i] != 0) { lobe.pdf } else { f32::INFINITY };
+        }
+        let (mut is_black, mut is_finite) = ([1; PIXELS], [1; PIXELS]);
+        for lane in 0..N_WAVELENGTHS {
+            for i in 0..PIXELS {
+                let f = fresnel_conductor_at(facet[i], eta.0[lane], k.0[lane]) * value[i];
+                is_black[i] &= u32::from(f == 0.0);
+                is_finite[i] &= u32::from(f.abs() < f32::INFINITY);
+                out[lane][i] = f;
+            }
+        }
+        let mut total = 0.0;
+        let mut scatters = [0; PIXELS];
+        for i in 0..PIXELS {
+            let is_found = (pdf[i] < f32::INFINITY) & (is_finite[i] != 0);
+            scatters[i] = u32::from(is_found);
+            let found = if is_found & light.found_by_bsdf & (is_black[i] == 0) { pdf[i] } else { 0.0 };
+            pdf[i] = if m.is_joined[i] != 0 { m.pdf[i] * (light.light_pdf + found) } else { 0.0 };
+        }
+        for i in 0..PIXELS {
+            total += pdf[i];
+        }
+        let scale = light.wi.dot(frame.z).abs() / total;
+        let is_any = total > 0.0;
+        for lane in 0..N_WAVELENGTHS {
+            let radiance = light.radiance.0[lane] * scale;
+            for i in 0..PIXELS {
+                let f = if scatters[i] != 0 { out[lane][i] } else { 0.0 };
+                let given = m.f[lane][i] * f * radiance;
+                out[lane][i] = if is_any & (m.is_joined[i] != 0) { given } else { 0.0 };
+            }
+        }
+    }
+}
+
+/// Adds what the sensor makes of radiance in the RGB basis, which is its multiple.
+pub(super) struct Respond<'a> {
+    pub radiance: &'a Spectra,
+    pub scale: [f32; 3],
+    pub sums: &'a mut [Sixteen; 3],
+}
+
+impl Kernel for Respond<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        for c in 0..3 {
+            for i in 0..PIXELS {
+                self.sums[c][i] += self.radiance[c][i] * self.scale[c];
+            }
+        }
+    }
+}

@@ -1,54 +1,42 @@
 //! Shared paths by the stages of `staged_path`, and the sum over a block in lanes: the same bits as one path at a time.
 
-use super::blocks::{BLOCKS, Blocks, Lobes, Meet, Meeting, Mirror, Model, NOWHERE, Receivers, Three};
+use super::blocks::{
+    BLOCKS, Blocks, GiveByMetal, GiveEvenly, Meet, Meeting, Model, Respond, Sixteen, Spectra, set_spectrum, spectrum,
+};
 use super::{Incoming, PIXELS, Scattered, SharedPathIntegrator, blocks_of, film_rgb, samples_of_block};
 use crate::camera_samples::{CameraSample, gather};
 use crate::integrator::{RenderStats, WorkUnit};
 use crate::path::PathIntegrator;
 use crate::staged_path::{Batch, Plain};
+use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, TransportMode};
 use irradiant_core::film::FilmTile;
-use irradiant_core::geometry::{Hit, Level};
+use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::{Interaction, TextureContext};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::LANES;
 use irradiant_math::{Ray, Vec3};
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
-use std::f32::consts::FRAC_1_PI;
+use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 use std::ops::Range;
 
-/// A first vertex and a second one.
-struct Pair {
-    receiver: u8,
-    /// Whether they are of one path.
-    is_own: bool,
-    /// Density with which the receiver's BSDF finds the second vertex, per area.
-    pdf: f32,
-    /// What the light there is multiplied with on its way to the camera.
-    f: SampledSpectrum,
-    /// From the second to the first.
-    wo: Vec3,
-}
-
-/// A second vertex with those that see it.
+/// A second vertex with those first ones that are joined to it.
 struct Giver {
     sample: usize,
-    pairs: Range<usize>,
+    meeting: Meeting,
+    /// Those that ask for what is between.
     rays: Range<usize>,
 }
 
 /// What batches need not allocate anew.
 struct Joints {
-    meeting: Meeting,
-    pairs: Vec<Pair>,
     givers: Vec<Giver>,
     rays: Vec<Ray>,
     ends: Vec<f32>,
     blocked: Vec<bool>,
     /// First vertices as materials see them, where they were asked for.
     places: Vec<Option<(Interaction, TextureContext)>>,
-    /// What the sensor makes of light that is shared, for each sample.
-    shared: Vec<[f32; 3]>,
+    /// What the sensor makes of light that is shared, for each block.
+    shared: Vec<[Sixteen; 3]>,
 }
 
 impl SharedPathIntegrator {
@@ -64,8 +52,6 @@ impl SharedPathIntegrator {
         let mut batch = Batch::new(scene);
         let mut blocks = Blocks::new();
         let mut joints = Joints {
-            meeting: Meeting::NONE,
-            pairs: Vec::new(),
             givers: Vec::new(),
             rays: Vec::new(),
             ends: Vec::new(),
@@ -81,14 +67,15 @@ impl SharedPathIntegrator {
             scene.geometry.intersect_batch(&joints.rays, &joints.ends, &scene.alpha(), hits);
             stats.camera_rays += samples.iter().filter(|sample| sample.camera_ray.is_some()).count() as u64;
             path.shared_batch(&mut batch, scene, samples, hits, &mut blocks, stats);
-            joints.share(scene, samples, hits, &blocks, stats);
+            joints.share(scene, samples, hits, &mut blocks, stats);
             for (s, sample) in samples.iter().enumerate() {
                 let ([x, y], b) = (sample.pixel, &unit.bounds);
                 if x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1 {
                     continue;
                 }
                 stats.paths += 1;
-                let rgb = film_rgb(scene, sample, &sample.lambda, blocks.own[s], joints.shared[s]);
+                let shared = joints.shared[s / PIXELS].map(|c| c[s % PIXELS]);
+                let rgb = film_rgb(scene, sample, &sample.lambda, blocks.own[s], shared);
                 if !tile.add(x, y, rgb, &[]) {
                     stats.refuse(x, y, sample.index);
                 }
@@ -114,14 +101,13 @@ impl Joints {
         scene: &Scene,
         samples: &[CameraSample],
         hits: &[Option<Hit>],
-        blocks: &Blocks,
+        blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
         self.shared.clear();
-        self.shared.resize(samples.len(), [0.0; 3]);
+        self.shared.resize(samples.len().div_ceil(PIXELS), [[0.0; PIXELS]; 3]);
         self.places.clear();
         self.places.resize(samples.len(), None);
-        self.pairs.clear();
         self.givers.clear();
         self.rays.clear();
         for s in 0..samples.len() {
@@ -131,202 +117,177 @@ impl Joints {
         self.ends.resize(self.rays.len(), 1.0);
         self.blocked.clear();
         self.blocked.resize(self.rays.len(), false);
-        for giver in &self.givers {
+        // Those to one second vertex travel together.
+        for giver in &mut self.givers {
             let these = giver.rays.clone();
             let blocked = &mut self.blocked[these.clone()];
             scene.geometry.occluded_batch(&self.rays[these.clone()], &self.ends[these], &scene.alpha(), blocked);
-        }
-        stats.shadow_rays += self.rays.len() as u64;
-        let level = scene.geometry.level();
-        for giver in &self.givers {
-            let Some(second) = &blocks.seconds[giver.sample] else { continue };
-            let lambda = &samples[giver.sample].lambda;
-            let shared = &mut self.shared[giver.sample / PIXELS * PIXELS..];
-            let mut answers = self.blocked[giver.rays.clone()].iter();
-            let mut seen: [&Pair; PIXELS] = [&NO_PAIR; PIXELS];
-            let mut n = 0;
-            for pair in &self.pairs[giver.pairs.clone()] {
-                if pair.is_own || answers.next() != Some(&true) {
-                    seen[n] = pair;
-                    n += 1;
+            let mut answers = blocked.iter();
+            for i in (0..PIXELS).filter(|i| *i != giver.sample % PIXELS) {
+                if giver.meeting.is_joined[i] != 0 && answers.next() == Some(&true) {
+                    giver.meeting.is_joined[i] = 0;
                 }
             }
-            give(&second.light, &seen[..n], &blocks.incoming, level, |receiver, radiance| {
-                let response = scene.sensor_response(radiance, lambda);
-                (0..3).for_each(|c| shared[receiver][c] += response[c]);
-            });
+        }
+        stats.shadow_rays += self.rays.len() as u64;
+        for giver in &self.givers {
+            if let Some(second) = &blocks.seconds[giver.sample] {
+                let (lambda, shared) = (&samples[giver.sample].lambda, &mut self.shared[giver.sample / PIXELS]);
+                give(scene, &giver.meeting, &second.light, &blocks.incoming, lambda, shared);
+            }
         }
     }
 
     /// Joins one second vertex, if there is one, to its block's first ones.
-    fn join(&mut self, scene: &Scene, samples: &[CameraSample], hits: &[Option<Hit>], blocks: &Blocks, s: usize) {
+    fn join(&mut self, scene: &Scene, samples: &[CameraSample], hits: &[Option<Hit>], blocks: &mut Blocks, s: usize) {
         let Some(second) = &blocks.seconds[s] else { return };
-        let (block, own) = (s / PIXELS, s % PIXELS);
-        let receivers = &blocks.receivers[block];
+        let (begin, own) = (s / PIXELS * PIXELS, s % PIXELS);
+        let receivers = &mut blocks.receivers[s / PIXELS];
         let side = match second.light {
             Scattered::Evenly { normal, .. } => Some(normal),
             Scattered::By { .. } => None,
         };
-        let meeting = &mut self.meeting;
-        scene.geometry.level().run(Meet { receivers, place: &second.place, side, out: meeting });
-        let (first_pair, first_ray) = (self.pairs.len(), self.rays.len());
-        for i in 0..PIXELS {
-            let (there, wi) = (meeting.there[i], meeting.wi.vector(i));
-            let (f_cos, pdf, wo) = if i == own {
-                (second.carried * second.pdf, second.pdf, second.wo)
-            } else {
-                if meeting.leaves[i] == 0 {
+        let lambda = &samples[s].lambda;
+        // In the RGB basis wavelengths are always the same.
+        let is_spectral = lambda.basis != Basis::Rgb;
+        let mut is_known = [!is_spectral; PIXELS];
+        if is_spectral {
+            let mut last = None;
+            for i in 0..PIXELS {
+                let Some(material) = receivers.materials[i].filter(|_| receivers.models[i] == Model::Plain) else {
                     continue;
-                }
-                let r = block * PIXELS + i;
-                let scattered = if samples[s].lambda == samples[r].lambda {
-                    scattered(receivers, i, meeting, blocks)
-                } else {
-                    scattered_at(
-                        receivers,
-                        i,
-                        meeting,
-                        scene,
-                        &samples[r],
-                        &hits[r],
-                        &mut self.places[r],
-                        &samples[s].lambda,
-                    )
                 };
-                let Some((f_cos, pdf)) = scattered else { continue };
-                (f_cos, pdf, -wi)
-            };
-            let pdf = pdf * there;
-            // Directions in which nothing is scattered are never drawn.
-            if !(pdf > 0.0) || !pdf.is_finite() || f_cos.is_black() {
-                continue;
+                let plain = match last {
+                    Some((known, plain)) if known == material => plain,
+                    _ => Plain::of(scene, material, lambda),
+                };
+                last = Some((material, plain));
+                is_known[i] = match plain {
+                    Plain::Diffuse(reflectance) => {
+                        receivers.set_diffuse(i, reflectance);
+                        true
+                    }
+                    Plain::Metal(metal) => {
+                        receivers.set_metal(i, &metal);
+                        true
+                    }
+                    Plain::Other => false,
+                };
             }
-            self.pairs.push(Pair { receiver: i as u8, is_own: i == own, pdf, f: f_cos * there, wo });
-            if i != own {
+        }
+        let first_ray = self.rays.len();
+        self.givers.push(Giver { sample: s, meeting: Meeting::NONE, rays: 0..0 });
+        let Some(Giver { meeting, rays, .. }) = self.givers.last_mut() else { return };
+        scene.geometry.level().run(Meet { receivers, place: &second.place, side, out: meeting });
+        meeting.set(own, second.carried * second.pdf, second.pdf);
+        meeting.wo.set(own, second.wo.to_array());
+        for i in (0..PIXELS).filter(|i| *i != own) {
+            let r = begin + i;
+            let is_alone = match receivers.models[i] {
+                Model::Nothing => false,
+                Model::Alone(_) => true,
+                Model::Plain => !is_known[i] && samples[r].lambda != *lambda,
+            };
+            if is_alone && meeting.leaves[i] != 0 {
+                let wi = -meeting.wo.vector(i);
+                let scattered = match receivers.models[i] {
+                    Model::Alone(k) if samples[r].lambda == *lambda => {
+                        let (bsdf, wo) = &blocks.alone[k as usize];
+                        let (f, pdf) = bsdf.f_and_pdf(*wo, wi, TransportMode::Radiance);
+                        Some((f * bsdf.abs_cos(wi), pdf))
+                    }
+                    _ => scattered_at(scene, &samples[r], hits[r].as_ref(), &mut self.places[r], lambda, wi),
+                };
+                let (f_cos, pdf) = scattered.unwrap_or((SampledSpectrum::ZERO, 0.0));
+                meeting.set(i, f_cos, pdf);
+            }
+            if meeting.is_joined[i] != 0 {
                 self.rays.push(Ray::new(meeting.o.point(i), meeting.d.vector(i), receivers.time));
             }
         }
-        let (pairs, rays) = (first_pair..self.pairs.len(), first_ray..self.rays.len());
-        self.givers.push(Giver { sample: s, pairs, rays });
+        *rays = first_ray..self.rays.len();
     }
 }
 
-const NO_PAIR: Pair = Pair { receiver: 0, is_own: false, pdf: 0.0, f: SampledSpectrum::ZERO, wo: Vec3::ZERO };
-
-/// What a first vertex scatters along its path of light from a second one, with the cosine, and the density with which it finds it, 1/sr.
-#[inline(always)]
-fn scattered(receivers: &Receivers, i: usize, meeting: &Meeting, blocks: &Blocks) -> Option<(SampledSpectrum, f32)> {
-    match &receivers.models[i] {
-        Model::Nothing => None,
-        Model::Diffuse(f) => Some((*f * meeting.cosine[i], meeting.pdf[i])),
-        Model::Metal(metal) => metal_lobe(metal, i, meeting),
-        Model::Alone(k) => {
-            let (bsdf, wo) = &blocks.alone[*k as usize];
-            let wi = meeting.wi.vector(i);
-            let (f, pdf) = bsdf.f_and_pdf(*wo, wi, TransportMode::Radiance);
-            Some((f * bsdf.abs_cos(wi), pdf))
-        }
-    }
-}
-
-/// As [`scattered`], for another path's wavelengths.
-#[inline(never)]
+/// What a first vertex scatters along its path of light that comes from `wi`, with the cosine, and the density with which it finds it, 1/sr,
+/// for another path's wavelengths.
 fn scattered_at(
-    receivers: &Receivers,
-    i: usize,
-    meeting: &Meeting,
     scene: &Scene,
     sample: &CameraSample,
-    hit: &Option<Hit>,
+    hit: Option<&Hit>,
     place: &mut Option<(Interaction, TextureContext)>,
     lambda: &Wavelengths,
+    wi: Vec3,
 ) -> Option<(SampledSpectrum, f32)> {
-    if matches!(receivers.models[i], Model::Nothing) {
-        return None;
-    }
-    if let Some(material) = receivers.materials[i]
-        && !matches!(receivers.models[i], Model::Alone(_))
-    {
-        match Plain::of(scene, material, lambda) {
-            Plain::Diffuse(reflectance) => {
-                return Some((reflectance * FRAC_1_PI * meeting.cosine[i], meeting.pdf[i]));
-            }
-            Plain::Metal(metal) => return metal_lobe(&metal, i, meeting),
-            Plain::Other => {}
-        }
-    }
     let camera_ray = sample.camera_ray.as_ref()?;
     if place.is_none() {
-        let at = scene.geometry.interaction(&camera_ray.ray, hit.as_ref()?);
+        let at = scene.geometry.interaction(&camera_ray.ray, hit?);
         *place = Some((at, scene.texture_context(&at, Some(camera_ray))));
     }
     let (at, footprint) = place.as_ref()?;
     let (mix, mut lambda) = (sample.stream.mix(0), *lambda);
     let bsdf = scene.materials.bsdf(at.material, &scene.textures, at, footprint, &mut lambda, mix)?;
-    let wi = meeting.wi.vector(i);
     let (f, pdf) = bsdf.f_and_pdf(at.wo, wi, TransportMode::Radiance);
     Some((f * bsdf.abs_cos(wi), pdf))
 }
 
-#[inline(always)]
-fn metal_lobe(metal: &irradiant_core::bxdf::Conductor, i: usize, meeting: &Meeting) -> Option<(SampledSpectrum, f32)> {
-    if !(meeting.pdf[i] > 0.0) {
-        return None;
-    }
-    let f = metal.fresnel(meeting.lobe[0][i]) * meeting.lobe[1][i];
-    f.is_finite().then(|| (f * meeting.cosine[i], meeting.pdf[i]))
-}
-
-/// As [`Scattered::give`], in lanes where light leaves a metal.
+/// Adds to `sums` what the sensor makes of the light that a second vertex gives to the first ones that it is joined to.
 fn give(
+    scene: &Scene,
+    meeting: &Meeting,
     light: &Scattered,
-    seen: &[&Pair],
     arriving: &[(u32, Incoming)],
-    level: Level,
-    mut to: impl FnMut(usize, SampledSpectrum),
+    lambda: &Wavelengths,
+    sums: &mut [Sixteen; 3],
 ) {
+    let level = scene.geometry.level();
+    let mut given = [[0.0; PIXELS]; N_WAVELENGTHS];
+    let mut respond = |radiance: &Spectra| match lambda.basis {
+        Basis::Rgb => {
+            let scale = scene.sensor_response(SampledSpectrum::ONE, lambda);
+            level.run(Respond { radiance, scale, sums });
+        }
+        Basis::Spectral => {
+            for i in (0..PIXELS).filter(|i| meeting.is_joined[*i] != 0) {
+                let response = scene.sensor_response(spectrum(radiance, i), lambda);
+                (0..3).for_each(|c| sums[c][i] += response[c]);
+            }
+        }
+    };
     match light {
         Scattered::Evenly { radiance, .. } => {
-            let total: f32 = seen.iter().map(|p| p.pdf).sum();
-            for pair in seen {
-                to(usize::from(pair.receiver), pair.f * *radiance * (1.0 / total));
-            }
+            level.run(GiveEvenly { meeting, radiance: *radiance, out: &mut given });
+            respond(&given);
         }
         Scattered::By { bsdf, incoming } => {
-            let mut wo: Three = NOWHERE;
-            seen.iter().enumerate().for_each(|(i, pair)| wo.set(i, pair.wo.to_array()));
-            let mut lobes = Lobes::NONE;
             for (_, light) in &arriving[incoming.clone()] {
-                let mut f = [SampledSpectrum::ZERO; PIXELS];
-                let mut total = 0.0;
-                let metal = match &bsdf.bxdf {
-                    Bxdf::Conductor(metal) => Some(metal),
-                    _ => None,
-                };
-                if let Some(metal) = metal {
-                    let (frame, facets, wi) = (&bsdf.frame, metal.facets(), light.wi);
-                    level.run(Mirror { frame, facets, wi, wo: &wo, out: &mut lobes });
+                match &bsdf.bxdf {
+                    Bxdf::Conductor(metal) => {
+                        level.run(GiveByMetal { meeting, frame: &bsdf.frame, metal, light, out: &mut given });
+                    }
+                    _ => give_alone(meeting, bsdf, light, &mut given),
                 }
-                for (i, (pair, f)) in seen.iter().zip(&mut f).enumerate() {
-                    let (value, pdf) = match metal {
-                        Some(metal) => {
-                            let value = metal.fresnel(lobes.cos[i]) * lobes.value[i];
-                            if value.is_finite() { (value, lobes.pdf[i]) } else { (SampledSpectrum::ZERO, 0.0) }
-                        }
-                        None => bsdf.f_and_pdf(pair.wo, light.wi, TransportMode::Radiance),
-                    };
-                    *f = value;
-                    let pdf = if light.found_by_bsdf && !value.is_black() { pdf } else { 0.0 };
-                    total += pair.pdf * (light.light_pdf + pdf);
-                }
-                if !(total > 0.0) {
-                    continue;
-                }
-                let radiance = light.radiance * (bsdf.abs_cos(light.wi) / total);
-                for (pair, f) in seen.iter().zip(&f) {
-                    to(usize::from(pair.receiver), pair.f * *f * radiance);
-                }
+                respond(&given);
             }
         }
+    }
+}
+
+/// As [`GiveByMetal`], of any model.
+fn give_alone(meeting: &Meeting, bsdf: &Bsdf, light: &Incoming, given: &mut Spectra) {
+    let mut f = [SampledSpectrum::ZERO; PIXELS];
+    let mut total = 0.0;
+    for i in (0..PIXELS).filter(|i| meeting.is_joined[*i] != 0) {
+        let (value, pdf) = bsdf.f_and_pdf(meeting.wo.vector(i), light.wi, TransportMode::Radiance);
+        f[i] = value;
+        let pdf = if light.found_by_bsdf && !value.is_black() { pdf } else { 0.0 };
+        total += meeting.pdf[i] * (light.light_pdf + pdf);
+    }
+    let is_any = total > 0.0;
+    let radiance = light.radiance * (bsdf.abs_cos(light.wi) / total);
+    for i in 0..PIXELS {
+        let is_joined = is_any && meeting.is_joined[i] != 0;
+        let value = if is_joined { spectrum(&meeting.f, i) * f[i] * radiance } else { SampledSpectrum::ZERO };
+        set_spectrum(given, i, value);
     }
 }
