@@ -73,8 +73,7 @@ fn limits_and_constant_roulette() {
     assert_same_by(&PathIntegrator { roulette: Roulette::Constant(0.3), ..PathIntegrator::default() }, &text);
 }
 
-#[test]
-fn lamps_of_all_kinds() {
+fn lamps_of_all_kinds() -> String {
     let lamps = [
         ceiling_lamp(),
         lamp("\"rgb L\" [ 2 9 3 ] \"bool twosided\" true", 0.5, 1.0, 0.4, 0.1),
@@ -83,7 +82,23 @@ fn lamps_of_all_kinds() {
         "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 5 1 5 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ -.9 .5 0  -.9 1 0  -.9 1 .5 ]\nAttributeEnd\n".into(),
         "LightSource \"point\" \"rgb I\" [ .3 .2 .2 ] \"point3 from\" [ 0 1 -.5 ]\n".into(),
     ];
-    assert_same(&format!("{HEAD}{ROOM}{}", lamps.concat()));
+    format!("{HEAD}{ROOM}{}", lamps.concat())
+}
+
+#[test]
+fn one_of_many_lamps() {
+    assert_same(&lamps_of_all_kinds());
+}
+
+#[test]
+fn several_light_samples() {
+    // Fewer strata than lamps, and one for each.
+    for light_splits in [3, 8] {
+        assert_same_by(&PathIntegrator { light_splits, ..PathIntegrator::default() }, &lamps_of_all_kinds());
+    }
+    // One lamp has one sample, but its light is weighed as one of all that are sampled.
+    let text = format!("{HEAD}{ROOM}{}", ceiling_lamp());
+    assert_same_by(&PathIntegrator { light_splits: 8, ..PathIntegrator::default() }, &text);
 }
 
 #[test]

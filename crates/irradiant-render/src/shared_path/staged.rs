@@ -17,19 +17,11 @@ use irradiant_core::scene::Scene;
 use irradiant_math::lanes::LANES;
 use irradiant_math::{Ray, Vec3};
 use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
-use std::ops::Range;
-
-/// A second vertex with those first ones that are joined to it.
-struct Giver {
-    sample: usize,
-    meeting: Meeting,
-    /// Those that ask for what is between.
-    rays: Range<usize>,
-}
 
 /// What batches need not allocate anew.
 struct Joints {
-    givers: Vec<Giver>,
+    /// Of a block's second vertices with its first ones.
+    meetings: Vec<Meeting>,
     rays: Vec<Ray>,
     ends: Vec<f32>,
     blocked: Vec<bool>,
@@ -52,7 +44,7 @@ impl SharedPathIntegrator {
         let mut batch = Batch::new(scene);
         let mut blocks = Blocks::new();
         let mut joints = Joints {
-            givers: Vec::new(),
+            meetings: vec![Meeting::NONE; PIXELS],
             rays: Vec::new(),
             ends: Vec::new(),
             blocked: Vec::new(),
@@ -108,32 +100,34 @@ impl Joints {
         self.shared.resize(samples.len().div_ceil(PIXELS), [[0.0; PIXELS]; 3]);
         self.places.clear();
         self.places.resize(samples.len(), None);
-        self.givers.clear();
-        self.rays.clear();
-        for s in 0..samples.len() {
-            self.join(scene, samples, hits, blocks, s);
-        }
-        self.ends.clear();
-        self.ends.resize(self.rays.len(), 1.0);
-        self.blocked.clear();
-        self.blocked.resize(self.rays.len(), false);
-        // Those to one second vertex travel together.
-        for giver in &mut self.givers {
-            let these = giver.rays.clone();
-            let blocked = &mut self.blocked[these.clone()];
-            scene.geometry.occluded_batch(&self.rays[these.clone()], &self.ends[these], &scene.alpha(), blocked);
-            let mut answers = blocked.iter();
-            for i in (0..PIXELS).filter(|i| *i != giver.sample % PIXELS) {
-                if giver.meeting.is_joined[i] != 0 && answers.next() == Some(&true) {
-                    giver.meeting.is_joined[i] = 0;
-                }
+        for begin in (0..samples.len()).step_by(PIXELS) {
+            self.rays.clear();
+            let mut rays = [0; PIXELS + 1];
+            for own in 0..PIXELS {
+                self.join(scene, samples, hits, blocks, begin + own);
+                rays[own + 1] = self.rays.len();
             }
-        }
-        stats.shadow_rays += self.rays.len() as u64;
-        for giver in &self.givers {
-            if let Some(second) = &blocks.seconds[giver.sample] {
-                let (lambda, shared) = (&samples[giver.sample].lambda, &mut self.shared[giver.sample / PIXELS]);
-                give(scene, &giver.meeting, &second.light, &blocks.incoming, lambda, shared);
+            self.ends.clear();
+            self.ends.resize(self.rays.len(), 1.0);
+            self.blocked.clear();
+            self.blocked.resize(self.rays.len(), false);
+            // Those to one second vertex travel together.
+            for of_one in rays.windows(2).map(|w| w[0]..w[1]) {
+                let (rays, ends) = (&self.rays[of_one.clone()], &self.ends[of_one.clone()]);
+                scene.geometry.occluded_batch(rays, ends, &scene.alpha(), &mut self.blocked[of_one]);
+            }
+            stats.shadow_rays += self.rays.len() as u64;
+            for own in 0..PIXELS {
+                let Some(second) = &blocks.seconds[begin + own] else { continue };
+                let meeting = &mut self.meetings[own];
+                let mut answers = self.blocked[rays[own]..rays[own + 1]].iter();
+                for i in (0..PIXELS).filter(|i| *i != own) {
+                    if meeting.is_joined[i] != 0 && answers.next() == Some(&true) {
+                        meeting.is_joined[i] = 0;
+                    }
+                }
+                let (lambda, shared) = (&samples[begin + own].lambda, &mut self.shared[begin / PIXELS]);
+                give(scene, meeting, &second.light, &blocks.incoming, lambda, shared);
             }
         }
     }
@@ -175,9 +169,7 @@ impl Joints {
                 };
             }
         }
-        let first_ray = self.rays.len();
-        self.givers.push(Giver { sample: s, meeting: Meeting::NONE, rays: 0..0 });
-        let Some(Giver { meeting, rays, .. }) = self.givers.last_mut() else { return };
+        let meeting = &mut self.meetings[own];
         scene.geometry.level().run(Meet { receivers, place: &second.place, side, out: meeting });
         meeting.set(own, second.carried * second.pdf, second.pdf);
         meeting.wo.set(own, second.wo.to_array());
@@ -205,7 +197,6 @@ impl Joints {
                 self.rays.push(Ray::new(meeting.o.point(i), meeting.d.vector(i), receivers.time));
             }
         }
-        *rays = first_ray..self.rays.len();
     }
 }
 
