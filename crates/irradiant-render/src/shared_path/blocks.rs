@@ -1,11 +1,11 @@
 //! The vertices of some blocks' paths side by side, and what of their connections is computed in lanes: a block's sixteen first vertices are the
 //! lanes of a loop.
 
-use super::{Incoming, LEAST_ALPHA, PIXELS, Scattered, Second};
+use super::{Incoming, PIXELS, Scattered, Second};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::mirror_lobe;
 use irradiant_core::bxdf::fresnel::fresnel_conductor_at;
-use irradiant_core::bxdf::{Bxdf, Conductor, Ggx, is_usable};
+use irradiant_core::bxdf::{Conductor, Ggx, is_usable};
 use irradiant_core::geometry::{Kernel, SurfaceLanes};
 use irradiant_core::interaction::{MaterialId, ReferencePoint};
 use irradiant_math::lanes::LANES;
@@ -92,6 +92,16 @@ pub(super) enum Model {
     Plain,
     /// By a model of its own: its place among those of the batch.
     Alone(u32),
+}
+
+/// The same, when it is told.
+pub(crate) enum FirstScattering<'a> {
+    /// By this reflectance.
+    Diffuse(SampledSpectrum),
+    /// As this rough metal.
+    Metal(&'a Conductor),
+    /// In the frame of its vertex.
+    Alone(&'a Bsdf),
 }
 
 /// The first vertices of a block's paths.
@@ -220,37 +230,35 @@ impl Blocks {
         at: &SurfaceLanes,
         i: usize,
         time: f32,
-        bsdf: Bsdf,
+        scattering: FirstScattering,
         material: Option<MaterialId>,
     ) {
         let (first, k) = (&mut self.receivers[s / PIXELS], s % PIXELS);
+        let (wo, frame) = (at.wo.vector(i), at.frame(i));
         first.p.set(k, at.p.point(i).to_array());
         first.p_error.set(k, at.p_error.vector(i).to_array());
         first.n.set(k, at.n.normal(i).to_array());
-        first.x.set(k, bsdf.frame.x.to_array());
-        first.y.set(k, bsdf.frame.y.to_array());
-        first.z.set(k, bsdf.frame.z.to_array());
-        let wo = at.wo.vector(i);
-        first.wo.set(k, bsdf.frame.to_local(wo).to_array());
+        first.x.set(k, frame.x.to_array());
+        first.y.set(k, frame.y.to_array());
+        first.z.set(k, frame.z.to_array());
+        first.wo.set(k, frame.to_local(wo).to_array());
         (first.materials[k], first.time) = (material, time);
-        first.models[k] = match bsdf.bxdf {
-            Bxdf::Diffuse(diffuse) => {
-                first.set_diffuse(k, diffuse.reflectance);
-                first.is_plain[k] = 1;
-                Model::Plain
-            }
-            Bxdf::Conductor(metal) if metal.alpha() >= LEAST_ALPHA => {
+        (first.is_plain[k], first.is_metal[k]) = (1, 0);
+        first.models[k] = Model::Plain;
+        match scattering {
+            FirstScattering::Diffuse(reflectance) => first.set_diffuse(k, reflectance),
+            FirstScattering::Metal(metal) => {
                 let [x, y] = metal.facets().alphas();
                 (first.alphas[0][k], first.alphas[1][k]) = (x, y);
-                first.set_metal(k, &metal);
-                (first.is_plain[k], first.is_metal[k]) = (1, 1);
-                Model::Plain
+                first.set_metal(k, metal);
+                first.is_metal[k] = 1;
             }
-            _ => {
-                self.alone.push((bsdf, wo));
-                Model::Alone(self.alone.len() as u32 - 1)
+            FirstScattering::Alone(bsdf) => {
+                first.is_plain[k] = 0;
+                first.models[k] = Model::Alone(self.alone.len() as u32);
+                self.alone.push((*bsdf, wo));
             }
-        };
+        }
     }
 
     /// When all paths are at their ends: puts together what came at different times.

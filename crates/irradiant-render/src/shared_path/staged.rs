@@ -98,8 +98,10 @@ impl Joints {
     ) {
         self.shared.clear();
         self.shared.resize(samples.len().div_ceil(PIXELS), [[0.0; PIXELS]; 3]);
-        self.places.clear();
-        self.places.resize(samples.len(), None);
+        if samples.iter().any(|sample| sample.lambda.basis != Basis::Rgb) {
+            self.places.clear();
+            self.places.resize(samples.len(), None);
+        }
         for begin in (0..samples.len()).step_by(PIXELS) {
             self.rays.clear();
             let mut rays = [0; PIXELS + 1];

@@ -6,7 +6,7 @@ use super::kernels::{Numbers, Scatter, Surfaces, Weigh};
 use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, survival_probability};
-use crate::shared_path::blocks::{Blocks, Kind};
+use crate::shared_path::blocks::{Blocks, FirstScattering, Kind};
 use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, Scattered, Second, gains, is_shared};
 use irradiant_core::bxdf::Bxdf;
 use irradiant_core::geometry::Hit;
@@ -80,7 +80,12 @@ impl PathIntegrator {
                     Surface::Flat(material, _) => Some(material),
                     Surface::Other => None,
                 };
-                blocks.set_first(s, &b.at, i, b.time[i], b.bsdf(i), material);
+                let scattering = match b.scattering[i] {
+                    Scattering::Diffuse | Scattering::Gone => FirstScattering::Diffuse(b.reflectance[i]),
+                    Scattering::Metal => FirstScattering::Metal(&b.metals[i]),
+                    Scattering::Alone(k) => FirstScattering::Alone(&b.bsdfs[k as usize]),
+                };
+                blocks.set_first(s, &b.at, i, b.time[i], scattering, material);
                 Kind::First
             } else {
                 Kind::Apart
