@@ -182,6 +182,7 @@ pub(crate) struct Blocks {
     pub(super) receivers: Vec<Receivers>,
     /// Models of their own, and the directions from which the camera sees them.
     pub(super) alone: Vec<(Bsdf, Vec3)>,
+    /// Second vertices that are shared; in the end, without those that no light leaves.
     pub seconds: Vec<Option<Second>>,
     /// What arrives at second vertices; in the end, one's after another's.
     pub incoming: Vec<(u32, Incoming)>,
@@ -274,7 +275,7 @@ impl Blocks {
                     }
                 }
                 Kind::By => {
-                    if let Some(wi) = self.next[s] {
+                    if let Some(wi) = self.next[s].filter(|_| !self.rest[s].is_black()) {
                         let light = Incoming { wi, radiance: self.rest[s], light_pdf: 0.0, found_by_bsdf: true };
                         self.incoming.push((s as u32, light));
                     }
@@ -291,6 +292,19 @@ impl Blocks {
                 *incoming = begin..end;
             }
             begin = end;
+        }
+        // Nobody needs to be asked whether he sees what is dark.
+        for second in &mut self.seconds {
+            let is_black = match second {
+                Some(Second { light: Scattered::Evenly { radiance, .. }, .. }) => radiance.is_black(),
+                Some(Second { light: Scattered::By { incoming, .. }, .. }) => {
+                    self.incoming[incoming.clone()].iter().all(|(_, light)| light.radiance.is_black())
+                }
+                None => false,
+            };
+            if is_black {
+                *second = None;
+            }
         }
     }
 }

@@ -28,6 +28,10 @@ pub(super) fn share(scene: &Scene, scratch: &mut Scratch, stats: &mut RenderStat
     pairs.clear();
     for (j, giver) in members.iter().enumerate() {
         let Some(second) = &giver.second else { continue };
+        // Nobody needs to be asked whether he sees what is dark.
+        if second.light.is_black(incoming) {
+            continue;
+        }
         let ReferencePoint { p, p_error, n, .. } = second.place;
         for (i, receiver) in members.iter().enumerate() {
             let Some(first) = &receiver.first else { continue };
@@ -104,6 +108,14 @@ pub(super) fn share(scene: &Scene, scratch: &mut Scratch, stats: &mut RenderStat
 }
 
 impl Scattered {
+    /// Whether no light leaves.
+    fn is_black(&self, arriving: &[Incoming]) -> bool {
+        match self {
+            Self::Evenly { radiance, .. } => radiance.is_black(),
+            Self::By { incoming, .. } => arriving[incoming.clone()].iter().all(|light| light.radiance.is_black()),
+        }
+    }
+
     /// Gives each first vertex that sees this one its share: its member and the radiance that reaches the camera.
     fn give(&self, seen: &[Pair], arriving: &[Incoming], mut to: impl FnMut(usize, SampledSpectrum)) {
         match self {
