@@ -189,7 +189,8 @@ impl Geometry {
         }
     }
 
-    fn sorts_rays(&self) -> bool {
+    /// Whether rays of a batch are sorted by where they go, so that large batches are best, in whatever order.
+    pub fn sorts_rays(&self) -> bool {
         self.groups[0].tree.sorts_rays(self.level)
     }
 

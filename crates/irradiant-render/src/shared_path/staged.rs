@@ -113,8 +113,10 @@ impl Joints {
             self.ends.resize(self.rays.len(), 1.0);
             self.blocked.clear();
             self.blocked.resize(self.rays.len(), false);
-            // Those to one second vertex travel together.
-            for of_one in rays.windows(2).map(|w| w[0]..w[1]) {
+            // Those to one second vertex travel together, unless rays are sorted anyway.
+            let all = [0, self.rays.len()];
+            for of_one in if scene.geometry.sorts_rays() { &all[..] } else { &rays[..] }.windows(2).map(|w| w[0]..w[1])
+            {
                 let (rays, ends) = (&self.rays[of_one.clone()], &self.ends[of_one.clone()]);
                 scene.geometry.occluded_batch(rays, ends, &scene.alpha(), &mut self.blocked[of_one]);
             }
