@@ -40,7 +40,7 @@ use std::f32::consts::FRAC_1_PI;
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
     pub(crate) fn has_stages(&self, scene: &Scene) -> bool {
-        !(self.light_splits > 1 && scene.materials.may_pass())
+        (self.light_splits == 1 || !scene.materials.may_pass())
             && !self.regularize
             && scene.layers.channels() == 0
             && StreamLanes::can_hold(&scene.sampler.stream([0, 0], 0))
