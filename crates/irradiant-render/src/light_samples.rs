@@ -86,7 +86,7 @@ pub(crate) fn samples_of(scene: &Scene, at: &ReferencePoint, light: LightId, spl
 
 /// As [`samples_of`], of a light that is picked with the chance `pmf`.
 #[inline]
-fn samples_by_chance(pmf: f32, splits: u32) -> f32 {
+pub(crate) fn samples_by_chance(pmf: f32, splits: u32) -> f32 {
     (pmf * splits as f32).min(1.0)
 }
 

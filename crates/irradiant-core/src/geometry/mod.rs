@@ -33,7 +33,7 @@ mod triangle_lanes;
 
 pub use accel::Alpha;
 pub use compile::compile_geometry;
-pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample};
+pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample, SphereLanes};
 
 pub use irradiant_bvh::{Kernel, Level};
 pub(crate) use spawn::segment;

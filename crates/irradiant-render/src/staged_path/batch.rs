@@ -4,16 +4,16 @@ use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::MirrorLobe;
 use irradiant_core::bxdf::{Conductor, Ggx};
-use irradiant_core::geometry::{Hit, RectangleLanes, SurfaceLanes, TriangleLanes};
+use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
 use irradiant_core::light::{PixelLine, PixelRun, TargetLanes};
-use irradiant_core::light_sampler::PickedLight;
+use irradiant_core::light_sampler::TreeLanes;
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
 use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3};
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 
 /// How a path's vertex scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,18 @@ pub(super) enum Surface {
     Flat(MaterialId, Option<LightId>),
     /// Something else.
     Other,
+}
+
+/// A lamp that a path meets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MetLamp {
+    /// The path's lane.
+    pub lane: u32,
+    pub light: LightId,
+    /// Parameters of the place, as the hit reports them.
+    pub uv: Point2,
+    /// What leaves it towards the path, not black.
+    pub emitted: SampledSpectrum,
 }
 
 /// What a material is that is the same everywhere.
@@ -103,10 +115,20 @@ pub(crate) struct Batch {
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
 
+    // Light of lamps that paths meet.
+    pub(super) lamps_met: Vec<MetLamp>,
+
     // Light samples.
-    pub(super) lamps: RectangleLanes,
-    /// The lamp that each lane holds.
-    pub(super) lamp: [u32; LANES],
+    /// Paths that look for light.
+    pub(super) seeking: Vec<u32>,
+    pub(super) tree: TreeLanes,
+    /// The lights that were picked.
+    pub(super) picked: [u32; LANES],
+    pub(super) rectangles: RectangleLanes,
+    pub(super) spheres: SphereLanes,
+    /// The lamp that each lane of these holds.
+    pub(super) rectangle: [u32; LANES],
+    pub(super) sphere: [u32; LANES],
     pub(super) two_sided: [u32; LANES],
     pub(super) targets: TargetLanes,
     pub(super) is_delta: [u32; LANES],
@@ -117,7 +139,7 @@ pub(crate) struct Batch {
     pub(super) light_cosine: Floats,
     pub(super) light_factor: Floats,
     /// Paths whose light samples are drawn alone, and their way to the sky.
-    pub(super) light_alone: Vec<(u32, PickedLight, Option<PixelLine>)>,
+    pub(super) light_alone: Vec<(u32, Option<PixelLine>)>,
     pub(super) light_runs: Vec<Option<PixelRun>>,
     pub(super) shadow_rays: Vec<Ray>,
     pub(super) shadow_ends: Vec<f32>,
@@ -164,8 +186,14 @@ impl Batch {
             bsdfs: Vec::new(),
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
-            lamps: RectangleLanes::NONE,
-            lamp: [NO_LAMP; LANES],
+            lamps_met: Vec::new(),
+            seeking: Vec::new(),
+            tree: TreeLanes::NONE,
+            picked: [0; LANES],
+            rectangles: RectangleLanes::NONE,
+            spheres: SphereLanes::NONE,
+            rectangle: [NO_LAMP; LANES],
+            sphere: [NO_LAMP; LANES],
             two_sided: [0; LANES],
             targets: TargetLanes::NONE,
             is_delta: [0; LANES],
@@ -228,6 +256,17 @@ impl Batch {
         self.met[to] = self.met[from];
         self.escape_place[to] = self.escape_place[from];
         self.sample[to] = self.sample[from];
+    }
+
+    /// What a material is, if that is the same everywhere.
+    #[inline(always)]
+    pub(super) fn plain(&mut self, scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> Plain {
+        match self.known.get_mut(material.0 as usize) {
+            Some(known) if lambda.basis == Basis::Rgb => {
+                *known.get_or_insert_with(|| Plain::of(scene, material, lambda))
+            }
+            _ => Plain::of(scene, material, lambda),
+        }
     }
 
     /// The weight of a lane's light sample over its density, where scattering finds its direction with the density `pdf`.

@@ -35,15 +35,28 @@ impl Kernel for Numbers<'_> {
 }
 
 /// Points of rectangular lamps.
-pub(super) struct SampleLamps<'a>(pub &'a mut Batch, pub usize);
+pub(super) struct SampleRectangles<'a>(pub &'a mut Batch, pub usize);
 
-impl Kernel for SampleLamps<'_> {
+impl Kernel for SampleRectangles<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
         let Self(b, n) = self;
         let [u, v, ..] = &b.light.0;
-        b.lamps.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+        b.rectangles.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+    }
+}
+
+/// Points of spherical lamps.
+pub(super) struct SampleSpheres<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for SampleSpheres<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        let [u, v, ..] = &b.light.0;
+        b.spheres.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
     }
 }
 
