@@ -27,6 +27,7 @@ pub struct TreeLanes {
     child: [u32; LANES],
     u: Floats,
     pmf: Floats,
+    step: Step,
 }
 
 const NOWHERE: u32 = u32::MAX;
@@ -59,8 +60,14 @@ impl PointLanes<'_> {
 
 impl TreeLanes {
     /// None yet.
-    pub const NONE: Self =
-        Self { lane: [0; LANES], node: [0; LANES], child: [0; LANES], u: [0.0; LANES], pmf: [0.0; LANES] };
+    pub const NONE: Self = Self {
+        lane: [0; LANES],
+        node: [0; LANES],
+        child: [0; LANES],
+        u: [0.0; LANES],
+        pmf: [0.0; LANES],
+        step: Step::NEW,
+    };
 }
 
 impl LightSampler {
@@ -206,10 +213,9 @@ impl Kernel for Descend<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { nodes, walks, n, at } = self;
-        let mut scratch = Scratch::NEW;
         for first in (0..n).step_by(POINTS) {
-            scratch.importances(nodes, walks, first, n, at);
-            let all = &scratch.importances;
+            walks.importances(nodes, first, n, at);
+            let all = &walks.step.importances;
             for k in 0..POINTS {
                 let i = first + k;
                 let step = choose(&[all[4 * k], all[4 * k + 1], all[4 * k + 2], all[4 * k + 3]], walks.u[i]);
@@ -234,10 +240,9 @@ impl Kernel for Ascend<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { nodes, walks, n, at } = self;
-        let mut scratch = Scratch::NEW;
         for first in (0..n).step_by(POINTS) {
-            scratch.importances(nodes, walks, first, n, at);
-            let all = &scratch.importances;
+            walks.importances(nodes, first, n, at);
+            let all = &walks.step.importances;
             for k in 0..POINTS {
                 let i = first + k;
                 let four = [all[4 * k], all[4 * k + 1], all[4 * k + 2], all[4 * k + 3]];
@@ -254,40 +259,44 @@ impl Kernel for Ascend<'_> {
 }
 
 /// What is side by side in one step.
+#[derive(Clone, Debug)]
 #[repr(C, align(64))]
-struct Scratch {
+struct Step {
     cones: Cones<Children>,
     p: [Children; 3],
     n: [Children; 3],
     importances: Children,
 }
 
-impl Scratch {
+impl Step {
     const NEW: Self = {
         let zero = [0.0; WIDTH * POINTS];
         Self { cones: Cones::splat(zero), p: [zero; 3], n: [zero; 3], importances: zero }
     };
+}
 
+impl TreeLanes {
     /// Those of the walks from `first` on.
     #[inline(always)]
-    fn importances(&mut self, nodes: &[Node], walks: &TreeLanes, first: usize, n: usize, at: PointLanes) {
+    fn importances(&mut self, nodes: &[Node], first: usize, n: usize, at: PointLanes) {
+        let step = &mut self.step;
         for k in 0..POINTS {
             // What is beyond the last walk is that one's again.
             let walk = (first + k).min(n - 1);
-            let (lane, node) = (walks.lane[walk] as usize, &nodes[walks.node[walk] as usize]);
+            let (lane, node) = (self.lane[walk] as usize, &nodes[self.node[walk] as usize]);
             let place = WIDTH * k..WIDTH * k + WIDTH;
-            self.cones.put(&node.cones, |all, row| all[place.clone()].copy_from_slice(row));
+            step.cones.put(&node.cones, |all, row| all[place.clone()].copy_from_slice(row));
             let (p, ns) = (at.p.point(lane).to_array(), at.ns.normal(lane).to_array());
             for axis in 0..3 {
-                self.p[axis][place.clone()].fill(p[axis]);
-                self.n[axis][place.clone()].fill(ns[axis]);
+                step.p[axis][place.clone()].fill(p[axis]);
+                step.n[axis][place.clone()].fill(ns[axis]);
             }
         }
         for i in 0..WIDTH * POINTS {
-            let cones = self.cones.of(|row| row[i]);
-            let n = [self.n[0][i], self.n[1][i], self.n[2][i]];
+            let cones = step.cones.of(|row| row[i]);
+            let n = [step.n[0][i], step.n[1][i], step.n[2][i]];
             let has_normal = (n[0] != 0.0) | (n[1] != 0.0) | (n[2] != 0.0);
-            self.importances[i] = cones.importance([self.p[0][i], self.p[1][i], self.p[2][i]], n, has_normal);
+            step.importances[i] = cones.importance([step.p[0][i], step.p[1][i], step.p[2][i]], n, has_normal);
         }
     }
 }

@@ -5,7 +5,7 @@ use super::quadric::{Ball, BallPoint, ball_error};
 use crate::geometry::SurfaceLanes;
 use crate::light::TargetLanes;
 use irradiant_math::Point2;
-use irradiant_math::lanes::{Floats, LANES, WHOLE, whole};
+use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE, whole};
 
 type Doubles = [f64; LANES];
 
@@ -20,6 +20,11 @@ pub struct SphereLanes {
     is_asked: [u32; LANES],
     /// 1 where it was.
     is_outside: [u32; LANES],
+    // What was drawn, before it goes to the lanes that asked: loops that read and write what others write too are not made vector code.
+    p: Triples,
+    p_error: Triples,
+    n: Triples,
+    pdf: Floats,
 }
 
 impl SphereLanes {
@@ -30,6 +35,10 @@ impl SphereLanes {
         sign: [1.0; LANES],
         is_asked: [0; LANES],
         is_outside: [0; LANES],
+        p: Triples::ZERO,
+        p_error: Triples::ZERO,
+        n: Triples::ZERO,
+        pdf: [0.0; LANES],
     };
 
     /// Nothing is to be drawn for a lane, unless it is asked for later.
@@ -70,35 +79,46 @@ impl SphereLanes {
         out: &mut TargetLanes,
     ) {
         for first in whole(n).step_by(WHOLE) {
-            if self.is_asked[first..first + WHOLE].iter().fold(0, |any, asked| any | asked) == 0 {
-                continue;
+            if self.is_asked[first..first + WHOLE].iter().fold(0, |any, asked| any | asked) != 0 {
+                self.draw(first, at, u);
             }
-            for i in first..first + WHOLE {
-                let ball = Ball {
-                    center: [self.center[0][i], self.center[1][i], self.center[2][i]],
-                    radius: self.radius[i],
-                    sign: self.sign[i],
-                };
-                let reference = at.p.point(i);
-                let (seen, is_outside) = ball.seen_from(reference, at.p_error.vector(i));
-                let BallPoint { p, n, pdf, exact } = ball.sample(&seen, Point2::new(u[0][i], u[1][i]));
-                let to = p - reference;
-                let d2 = to.length_squared();
-                let wi = to * (1.0 / d2.sqrt());
-                let usable = (pdf > 0.0) & (pdf < f32::INFINITY) & (d2 > 0.0);
-                let shines = (two_sided[i] != 0) | !(n.dot(wi) > 0.0);
-                let pdf = if usable & shines { pdf } else { 0.0 };
-                let is_asked = self.is_asked[i] != 0;
-                let choose = |a: f32, b: f32| if is_asked { a } else { b };
-                let choose3 = |a: [f32; 3], b: [f32; 3]| [choose(a[0], b[0]), choose(a[1], b[1]), choose(a[2], b[2])];
-                out.wi.set(i, choose3(wi.to_array(), out.wi.vector(i).to_array()));
-                out.pdf[i] = choose(pdf, out.pdf[i]);
-                out.p.set(i, choose3(p.to_array(), out.p.vector(i).to_array()));
-                out.p_error.set(i, choose3(ball_error(exact).to_array(), out.p_error.vector(i).to_array()));
-                out.n.set(i, choose3(n.to_array(), out.n.vector(i).to_array()));
-                out.is_infinite[i] = if is_asked { 0 } else { out.is_infinite[i] };
-                self.is_outside[i] = u32::from(is_outside);
-            }
+        }
+        for i in whole(n) {
+            let to = self.p.point(i) - at.p.point(i);
+            let d2 = to.length_squared();
+            let wi = to * (1.0 / d2.sqrt());
+            let (normal, pdf) = (self.n.normal(i), self.pdf[i]);
+            let usable = (pdf > 0.0) & (pdf < f32::INFINITY) & (d2 > 0.0);
+            let shines = (two_sided[i] != 0) | !(normal.dot(wi) > 0.0);
+            let pdf = if usable & shines { pdf } else { 0.0 };
+            let is_asked = self.is_asked[i] != 0;
+            let choose = |a: f32, b: f32| if is_asked { a } else { b };
+            let choose3 = |a: [f32; 3], b: [f32; 3]| [choose(a[0], b[0]), choose(a[1], b[1]), choose(a[2], b[2])];
+            out.wi.set(i, choose3(wi.to_array(), out.wi.vector(i).to_array()));
+            out.pdf[i] = choose(pdf, out.pdf[i]);
+            out.p.set(i, choose3(self.p.point(i).to_array(), out.p.vector(i).to_array()));
+            out.p_error.set(i, choose3(self.p_error.vector(i).to_array(), out.p_error.vector(i).to_array()));
+            out.n.set(i, choose3(normal.to_array(), out.n.vector(i).to_array()));
+            out.is_infinite[i] = if is_asked { 0 } else { out.is_infinite[i] };
+        }
+    }
+
+    /// A point of each ball of a vector.
+    #[inline(always)]
+    fn draw(&mut self, first: usize, at: &SurfaceLanes, u: [&Floats; 2]) {
+        for i in first..first + WHOLE {
+            let ball = Ball {
+                center: [self.center[0][i], self.center[1][i], self.center[2][i]],
+                radius: self.radius[i],
+                sign: self.sign[i],
+            };
+            let (seen, is_outside) = ball.seen_from(at.p.point(i), at.p_error.vector(i));
+            let BallPoint { p, n, pdf, exact } = ball.sample(&seen, Point2::new(u[0][i], u[1][i]));
+            self.p.set(i, p.to_array());
+            self.p_error.set(i, ball_error(exact).to_array());
+            self.n.set(i, n.to_array());
+            self.pdf[i] = pdf;
+            self.is_outside[i] = u32::from(is_outside);
         }
     }
 }
