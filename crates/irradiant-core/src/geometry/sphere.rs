@@ -11,6 +11,9 @@ use std::f32::consts::TAU;
 /// Candidate ray parameters, nearer first.
 pub(crate) type Roots = [f64; 2];
 
+/// What a ray misses by more than this share of its squared distance from the centre it misses whatever was rounded: 10^6 roundings.
+const CLEARLY: f64 = 1e-10;
+
 /// A sphere of shape space with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Sphere {
@@ -54,7 +57,12 @@ impl Sphere {
     /// Both roots, nearer first, whatever their sign; not yet cut.
     #[inline]
     pub fn roots(&self, o: Double3, d: Double3) -> Option<Roots> {
-        quadric_roots(dot(d, d), dot(o, d), length(o), self.radius, |t| length(add(o, scale(d, t))))
+        let (a, b, c) = (dot(d, d), dot(o, d), dot(o, o));
+        // Half of the rays that meet the box clearly miss the sphere: no roots or quotients for them.
+        if c * a - b * b > (self.radius * self.radius + CLEARLY * c) * a {
+            return None;
+        }
+        quadric_roots(a, b, c.sqrt(), self.radius, |t| length(add(o, scale(d, t))))
     }
 
     /// The point at `t`, brought back to the sphere, unless it is cut off.
