@@ -145,7 +145,8 @@ pub fn for_each_first_hit<A, B>(
 
 /// What taking many samples at once needs memory for: kept from one unit to the next.
 pub(crate) struct SampleBatch<'a> {
-    places: Vec<([i32; 2], u32)>,
+    /// Samples put down: pixel, index, random numbers.
+    places: Vec<([i32; 2], u32, SampleStream<'a>)>,
     samples: Vec<CameraSample<'a>>,
     streams: StreamLanes,
     /// The camera's numbers, and where on the lens.
@@ -188,7 +189,9 @@ impl<'a> SampleBatch<'a> {
         let all = unit.bounds.area() * unit.samples.len();
         let together = all.div_ceil(all.div_ceil(LANES).max(1)).next_multiple_of(WHOLE).min(LANES);
         for_each_place(unit, |pixel, index| {
-            self.places.push((pixel, index));
+            let stream = scene.sampler.stream(pixel, index);
+            self.streams.set(self.places.len(), &stream);
+            self.places.push((pixel, index, stream));
             if self.places.len() == together {
                 self.take(scene, tile, stats, &mut radiance);
             }
@@ -220,10 +223,6 @@ impl<'a> SampleBatch<'a> {
     fn draw(&mut self, scene: &'a Scene) {
         self.samples.clear();
         let has_lens = scene.camera.has_lens();
-        let streams = self.places.iter().map(|&(pixel, index)| scene.sampler.stream(pixel, index));
-        for (i, stream) in streams.enumerate() {
-            self.streams.set(i, &stream);
-        }
         scene.geometry.level().run(CameraNumbers {
             n: self.places.len(),
             streams: &self.streams,
@@ -231,11 +230,10 @@ impl<'a> SampleBatch<'a> {
             numbers: &mut self.numbers,
         });
         let [camera, lens] = &self.numbers;
-        self.samples.extend(self.places.drain(..).enumerate().map(|(i, (pixel, index))| {
-            let stream = scene.sampler.stream(pixel, index);
+        for (i, (pixel, index, stream)) in self.places.drain(..).enumerate() {
             let lens = if has_lens { lens.uv(i) } else { LENS_CENTER };
-            camera_sample_of(scene, pixel, index, stream, camera.camera_draws(i), lens)
-        }));
+            self.samples.push(camera_sample_of(scene, pixel, index, stream, camera.camera_draws(i), lens));
+        }
     }
 }
 
@@ -302,7 +300,8 @@ fn add_sample(
         stats.camera_rays += 1;
         let mut lambda = sample.lambda;
         let l = radiance(sample, camera_ray, &mut lambda, layers, stats) * camera_ray.weight;
-        rgb = scene.film_rgb(l, &lambda).map(|c| c * sample.filter_weight);
+        let [r, g, b] = scene.film_rgb(l, &lambda);
+        rgb = [r * sample.filter_weight, g * sample.filter_weight, b * sample.filter_weight];
         scene.layers.add_buckets(l, &lambda, layers);
         layers.iter_mut().for_each(|value| *value *= sample.filter_weight);
     }

@@ -11,7 +11,7 @@ use std::f32::consts::TAU;
 /// Candidate ray parameters, nearer first.
 pub(crate) type Roots = [f64; 2];
 
-/// What a ray misses by more than this share of its squared distance from the centre it misses whatever was rounded: 10^6 roundings.
+/// What a ray misses by this share of its squared distance from the centre it misses whatever was rounded: 10^6 roundings.
 const CLEARLY: f64 = 1e-10;
 
 /// A sphere of shape space with its place.
@@ -57,12 +57,21 @@ impl Sphere {
     /// Both roots, nearer first, whatever their sign; not yet cut.
     #[inline]
     pub fn roots(&self, o: Double3, d: Double3) -> Option<Roots> {
+        quadric_roots(dot(d, d), dot(o, d), length(o), self.radius, |t| length(add(o, scale(d, t))))
+    }
+
+    /// True when no root, as it is computed and rounded, is one of 0 to `t_max`: without roots and quotients. Most rays that meet the box do
+    /// not meet the sphere: they pass it, or end before it, as those do that ask for what is in the way of its light.
+    #[inline]
+    pub fn is_clearly_missed(&self, o: Double3, d: Double3, t_max: f32) -> bool {
         let (a, b, c) = (dot(d, d), dot(o, d), dot(o, o));
-        // Half of the rays that meet the box clearly miss the sphere: no roots or quotients for them.
-        if c * a - b * b > (self.radius * self.radius + CLEARLY * c) * a {
-            return None;
-        }
-        quadric_roots(a, b, c.sqrt(), self.radius, |t| length(add(o, scale(d, t))))
+        let end = add(o, scale(d, t_max as f64));
+        // Not the sphere but a larger one, by far more than is rounded.
+        let limit = self.radius * self.radius + CLEARLY * c;
+        let passes = c * a - b * b > limit * a;
+        let ends_before = (dot(end, end) > limit) & (dot(end, d) < 0.0);
+        let starts_behind = (c > limit) & (b > 0.0);
+        passes | ends_before | starts_behind
     }
 
     /// The point at `t`, brought back to the sphere, unless it is cut off.
