@@ -7,7 +7,7 @@ use irradiant_core::bxdf::{Conductor, Ggx};
 use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
-use irradiant_core::light::{PixelLine, PixelRun, TargetLanes};
+use irradiant_core::light::{ImageInfiniteLight, PixelLine, PixelRun, SkyLanes, TargetLanes};
 use irradiant_core::light_sampler::TreeLanes;
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
@@ -130,6 +130,7 @@ pub(crate) struct Batch {
     pub(super) rectangle: [u32; LANES],
     pub(super) sphere: [u32; LANES],
     pub(super) two_sided: [u32; LANES],
+    pub(super) sky: SkyLanes,
     pub(super) targets: TargetLanes,
     pub(super) is_delta: [u32; LANES],
     pub(super) arriving: [SampledSpectrum; LANES],
@@ -152,6 +153,8 @@ pub(crate) struct Batch {
     pub(super) next_pdf: Floats,
     /// cos / pdf; negative where nothing is scattered.
     pub(super) next_factor: Floats,
+    /// Where on the sky's image directions lead to.
+    pub(super) places: [Floats; 2],
 }
 
 const NO_LAMP: u32 = u32::MAX;
@@ -195,6 +198,7 @@ impl Batch {
             rectangle: [NO_LAMP; LANES],
             sphere: [NO_LAMP; LANES],
             two_sided: [0; LANES],
+            sky: SkyLanes::NONE,
             targets: TargetLanes::NONE,
             is_delta: [0; LANES],
             arriving: [SampledSpectrum::ZERO; LANES],
@@ -210,12 +214,21 @@ impl Batch {
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
             next_factor: [0.0; LANES],
+            places: [[0.0; LANES]; 2],
         })
     }
 
     #[inline(always)]
     pub fn ray(&self, i: usize) -> Ray {
         Ray::new(self.o.point(i), self.d.vector(i), self.time[i])
+    }
+
+    /// Where on the sky's image the direction of a lane leads to, whose memory is asked for.
+    #[inline]
+    pub fn place(&self, i: usize, sky: &ImageInfiniteLight) -> Point2 {
+        let place = Point2::new(self.places[0][i], self.places[1][i]);
+        sky.prefetch(place);
+        place
     }
 
     /// A path on its way to what it meets.

@@ -1,7 +1,7 @@
 //! Light of lamps: those that paths meet, and those that are sampled at vertices.
 
 use super::batch::{Batch, MetLamp, Scattering};
-use super::kernels::{SampleRectangles, SampleSpheres, Weigh};
+use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
 use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::{direct_light, samples_by_chance};
@@ -74,7 +74,7 @@ impl Batch {
         stats: &mut RenderStats,
     ) {
         self.pick_lights(n, scene);
-        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(depth, scene, samples, radiance, stats);
+        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(n, depth, scene, samples, radiance, stats);
         if any {
             scene.geometry.level().run(Weigh(self, n));
             self.arriving_light(n, scene, radiance, stats);
@@ -118,6 +118,7 @@ impl Batch {
         let (mut any_rectangle, mut any_sphere) = (false, false);
         for i in 0..n {
             self.spheres.forget(i);
+            self.sky.forget(i);
             if !(self.pmf[i] > 0.0) {
                 continue;
             }
@@ -173,6 +174,7 @@ impl Batch {
     /// Light samples that are asked alone. Whether there are any.
     fn sample_alone(
         &mut self,
+        n: usize,
         depth: u32,
         scene: &Scene,
         samples: &[CameraSample],
@@ -186,20 +188,27 @@ impl Batch {
             self.light_alone.iter().map(|&(_, line)| line.zip(sky).map(|(line, (_, sky))| sky.approach(line, MODE))),
         );
         let may_pass = scene.materials.may_pass();
-        let mut any = false;
+        let (mut any, mut any_sky) = (false, false);
         for j in 0..self.light_alone.len() {
             let ((i, _), run) = (self.light_alone[j], self.light_runs[j]);
             let i = i as usize;
             let s = self.sample[i] as usize;
             let lambda = &samples[s].lambda;
             let light = scene.lights.get(LightId(self.picked[i]));
-            let sample = match (run, sky) {
-                _ if may_pass && light.is_delta() => {
-                    radiance[s] += self.light_alone(i, depth, scene, lambda, stats);
-                    None
+            if let (Some(run), Some((_, sky))) = (run, sky) {
+                if let Some(radiance) = self.sky.arrive(i, sky, run, lambda, MODE) {
+                    (self.arriving[i], self.is_delta[i]) = (radiance, 0);
+                    any_sky = true;
+                } else {
+                    self.pmf[i] = 0.0;
                 }
-                (Some(run), Some((_, sky))) => sky.arrive(run, lambda, MODE),
-                _ => light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE),
+                continue;
+            }
+            let sample = if may_pass && light.is_delta() {
+                radiance[s] += self.light_alone(i, depth, scene, lambda, stats);
+                None
+            } else {
+                light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE)
             };
             let Some(sample) = sample else {
                 self.pmf[i] = 0.0;
@@ -210,7 +219,10 @@ impl Batch {
             self.is_delta[i] = u32::from(sample.is_delta);
             any = true;
         }
-        any
+        if let (true, Some((_, sky))) = (any_sky, sky) {
+            scene.geometry.level().run(SampleSky(self, n, sky));
+        }
+        any | any_sky
     }
 
     /// A light sample of one path.

@@ -30,7 +30,7 @@ use irradiant_core::sampler::{SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Frame, Ray, offset_ray_origin};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
-use kernels::{Numbers, Scatter, Surfaces};
+use kernels::{Numbers, PlacesOfBounces, PlacesOfCamera, Scatter, Surfaces};
 use std::f32::consts::FRAC_1_PI;
 
 impl PathIntegrator {
@@ -52,7 +52,7 @@ impl PathIntegrator {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        let level = scene.geometry.level();
+        let (level, sky) = (scene.geometry.level(), scene.lights.sky().map(|(_, sky)| sky));
         let mut n = 0;
         for (s, sample) in samples.iter().enumerate() {
             let Some(camera_ray) = &sample.camera_ray else { continue };
@@ -61,10 +61,17 @@ impl PathIntegrator {
             b.d.set(n, ray.d.to_array());
             b.time[n] = ray.time;
             b.streams.set(n, &sample.stream);
-            b.escape_place[n] = hits[s].map_or_else(|| scene.lights.place_of_escape(ray.d), |_| None);
             (b.throughput[n], b.roulette_scale[n]) = (SampledSpectrum::ONE, 1.0);
             (b.met[n], b.sample[n]) = (hits[s], s as u32);
             n += 1;
+        }
+        if let Some(sky) = sky
+            && b.met[..n].iter().any(Option::is_none)
+        {
+            level.run(PlacesOfCamera(b, n, sky));
+            for i in 0..n {
+                b.escape_place[i] = b.met[i].map_or_else(|| Some(b.place(i, sky)), |_| None);
+            }
         }
         let mut depth = 0;
         loop {
@@ -84,6 +91,9 @@ impl PathIntegrator {
             level.run(Numbers(b, n, depth));
             b.light_samples(n, depth, scene, samples, radiance, stats);
             level.run(Scatter(b, n));
+            if let Some(sky) = sky {
+                level.run(PlacesOfBounces(b, n, sky));
+            }
             depth += 1;
             n = self.go_on(b, n, depth, scene, stats);
         }
@@ -229,6 +239,7 @@ impl PathIntegrator {
 
     /// Plays roulette and traces the rays of paths that go on, `depth` scattering events by then. How many do.
     fn go_on(&self, b: &mut Batch, n: usize, depth: u32, scene: &Scene, stats: &mut RenderStats) -> usize {
+        let sky = scene.lights.sky().map(|(_, sky)| sky);
         let mut stay = 0;
         for i in 0..n {
             let mut throughput = b.throughput[i];
@@ -303,7 +314,10 @@ impl PathIntegrator {
             b.time[stay] = ray.time;
             b.streams.shift(stay, i);
             b.sample[stay] = b.sample[i];
-            b.escape_place[stay] = scene.lights.place_of_escape(wi);
+            b.escape_place[stay] = match b.scattering[i] {
+                Scattering::Alone(_) => scene.lights.place_of_escape(wi),
+                Scattering::Diffuse | Scattering::Metal | Scattering::Gone => sky.map(|sky| b.place(i, sky)),
+            };
             b.rays[stay] = ray;
             stay += 1;
         }
