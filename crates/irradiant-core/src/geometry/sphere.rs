@@ -150,3 +150,34 @@ pub(crate) fn quadric_roots(a: f64, b: f64, o: f64, r: f64, distance_at: impl Fn
     };
     Some(if t0 <= t1 { [t0, t1] } else { [t1, t0] })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use irradiant_testkit::Rng;
+
+    // Rays towards, past, from within and from the surface itself; ends before, on and behind it.
+    #[test]
+    fn what_is_clearly_missed_has_no_root_in_reach() {
+        let mut rng = Rng::new(9);
+        let placement = Placement::new(&irradiant_math::Transform::IDENTITY, false).expect("the identity is affine");
+        let sphere = Sphere::new(1.0, -1.0, 1.0, 360.0, placement);
+        let (mut missed, mut told) = (0, 0);
+        for i in 0..400_000 {
+            let distance = [0.0, 0.5, 1.0, 1.0 + 1e-7, 1.5, 30.0, 1e4][i % 7];
+            let (o, to) = (rng.direction().map(f64::from), rng.direction().map(f64::from));
+            let o = scale(o, distance);
+            // Many of them graze.
+            let aim = if i % 2 == 0 { scale(to, 1.0 + 1e-6 * (rng.next_f32() as f64 - 0.5)) } else { scale(to, 1.3) };
+            let d = add(aim, scale(o, -1.0));
+            let t_max = [f32::INFINITY, 1.0, 0.999_999, rng.next_f32()][i / 7 % 4];
+            let within = |t: f64| t > 0.0 && (t as f32) > 0.0 && (t as f32) < t_max;
+            let is_met = sphere.roots(o, d).is_some_and(|roots| roots.into_iter().any(within));
+            let is_told = sphere.is_clearly_missed(o, d, t_max);
+            assert!(!(is_met && is_told), "{o:?} {d:?} {t_max}");
+            missed += u32::from(!is_met);
+            told += u32::from(is_told);
+        }
+        assert!(told as f64 > 0.5 * missed as f64, "{told} of {missed}");
+    }
+}

@@ -124,6 +124,7 @@ impl TreeSampler {
         pmf: &mut Floats,
     ) {
         let mut n = 0;
+        walks.step.holds = NOWHERE;
         for &lane in lanes {
             let i = lane as usize;
             (id[i], pmf[i]) = (0, 0.0);
@@ -169,6 +170,7 @@ impl TreeSampler {
         pmf: &mut Floats,
     ) {
         let mut n = 0;
+        walks.step.holds = NOWHERE;
         for &lane in lanes {
             let i = lane as usize;
             let place = self.places[id[i] as usize];
@@ -262,6 +264,8 @@ impl Kernel for Ascend<'_> {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct Step {
+    /// The node whose children these are for all points, if they are of one.
+    holds: u32,
     cones: Cones<Children>,
     p: [Children; 3],
     n: [Children; 3],
@@ -271,7 +275,7 @@ struct Step {
 impl Step {
     const NEW: Self = {
         let zero = [0.0; WIDTH * POINTS];
-        Self { cones: Cones::splat(zero), p: [zero; 3], n: [zero; 3], importances: zero }
+        Self { holds: NOWHERE, cones: Cones::splat(zero), p: [zero; 3], n: [zero; 3], importances: zero }
     };
 }
 
@@ -280,12 +284,21 @@ impl TreeLanes {
     #[inline(always)]
     fn importances(&mut self, nodes: &[Node], first: usize, n: usize, at: PointLanes) {
         let step = &mut self.step;
+        // What is beyond the last walk is that one's again.
+        let walk = |k: usize| (first + k).min(n - 1);
+        // At the root all are at one node, as all of the vector before were.
+        let at_first = self.node[first];
+        let is_one = (0..POINTS).fold(true, |is_one, k| is_one & (self.node[walk(k)] == at_first));
+        if !(is_one && step.holds == at_first) {
+            for k in 0..POINTS {
+                let node = &nodes[self.node[walk(k)] as usize];
+                let place = WIDTH * k..WIDTH * k + WIDTH;
+                step.cones.put(&node.cones, |all, row| all[place.clone()].copy_from_slice(row));
+            }
+            step.holds = if is_one { at_first } else { NOWHERE };
+        }
         for k in 0..POINTS {
-            // What is beyond the last walk is that one's again.
-            let walk = (first + k).min(n - 1);
-            let (lane, node) = (self.lane[walk] as usize, &nodes[self.node[walk] as usize]);
-            let place = WIDTH * k..WIDTH * k + WIDTH;
-            step.cones.put(&node.cones, |all, row| all[place.clone()].copy_from_slice(row));
+            let (lane, place) = (self.lane[walk(k)] as usize, WIDTH * k..WIDTH * k + WIDTH);
             let (p, ns) = (at.p.point(lane).to_array(), at.ns.normal(lane).to_array());
             for axis in 0..3 {
                 step.p[axis][place.clone()].fill(p[axis]);

@@ -122,3 +122,94 @@ impl SphereLanes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::emitter::ShapeSample;
+    use crate::geometry::placement::Placement;
+    use crate::geometry::sphere::Sphere;
+    use crate::geometry::{EmitterShape, Kernel, Level};
+    use crate::light::{AreaAlpha, AreaLight, AreaRadiance, Emission};
+    use irradiant_math::{Transform, Vec3};
+    use irradiant_spectrum::{ColorSpace, Role, Spectrum, Wavelengths};
+    use irradiant_testkit::Rng;
+
+    struct Draw<'a>(
+        &'a mut SphereLanes,
+        usize,
+        &'a SurfaceLanes,
+        [&'a Floats; 2],
+        &'a [u32; LANES],
+        &'a mut TargetLanes,
+    );
+
+    impl Kernel for Draw<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run(self) {
+            self.0.sample(self.1, self.2, self.3, self.4, self.5);
+        }
+    }
+
+    // Large and tiny cones, both orientations, points within, lanes that are not asked: as one lamp at a time, to the bit.
+    #[test]
+    fn lanes_draw_what_lamps_alone_do() {
+        let mut rng = Rng::new(4);
+        let white = Spectrum::constant(1.0, Role::Illuminant, ColorSpace::srgb());
+        let lamps: Vec<AreaLight> = (0..LANES)
+            .map(|i| {
+                let mut x = || rng.next_f32() as f64 * 4.0 - 2.0;
+                let move_by = Transform::translate(x(), x(), x());
+                let placement = Placement::new(&move_by, i % 3 == 0).expect("an affine map");
+                let radius = [0.01, 0.3, 2.0][i % 3];
+                let sphere = SphereEmitter::new(Sphere::new(radius, -radius, radius, 360.0, placement));
+                AreaLight {
+                    shape: EmitterShape::Sphere(Box::new(sphere)),
+                    radiance: AreaRadiance::Uniform(Emission::new(&white, 1.0, ColorSpace::srgb())),
+                    scale: 1.0,
+                    two_sided: i % 5 == 0,
+                    alpha: AreaAlpha::Constant(1.0),
+                }
+            })
+            .collect();
+        for level in Level::available() {
+            let (mut lanes, mut at, mut out) = (SphereLanes::NONE, SurfaceLanes::ZERO, TargetLanes::NONE);
+            let (mut u, mut two_sided) = ([[0.0; LANES]; 2], [0; LANES]);
+            for (i, lamp) in lamps.iter().enumerate() {
+                let EmitterShape::Sphere(sphere) = &lamp.shape else { unreachable!("all are spheres") };
+                assert!(lanes.set(i, sphere));
+                if i % 7 != 0 {
+                    lanes.ask(i);
+                }
+                at.p.set(i, [0; 3].map(|_| rng.next_f32() * 6.0 - 3.0));
+                at.p_error.set(i, [1e-6; 3]);
+                u.iter_mut().for_each(|u| u[i] = rng.next_f32());
+                two_sided[i] = u32::from(lamp.two_sided);
+                out.pdf[i] = -1.0;
+            }
+            level.run(Draw(&mut lanes, 229, &at, [&u[0], &u[1]], &two_sided, &mut out));
+            let mut left = 0;
+            for (i, lamp) in lamps.iter().enumerate().take(229) {
+                let (reference, uv) = (at.reference(i), Point2::new(u[0][i], u[1][i]));
+                if i % 7 == 0 {
+                    assert_eq!((out.pdf[i], lanes.is_left(i)), (-1.0, false), "not asked");
+                } else if lanes.is_left(i) {
+                    let EmitterShape::Sphere(sphere) = &lamp.shape else { unreachable!("all are spheres") };
+                    assert!(sphere.pdf(&reference, Vec3::X, reference.p).is_none());
+                    left += 1;
+                } else {
+                    let drawn = lamp.sample(&reference, uv, &Wavelengths::rgb());
+                    assert_eq!(out.pdf[i], drawn.map_or(0.0, |s| s.pdf), "{level:?} {i}");
+                    if let Some(drawn) = drawn {
+                        let ShapeSample { p, p_error, n, .. } =
+                            lamp.shape.sample(&reference, uv, false).expect("just drawn");
+                        assert_eq!((out.wi.vector(i), out.p.point(i)), (drawn.wi, p), "{level:?} {i}");
+                        assert_eq!((out.p_error.vector(i), out.n.normal(i)), (p_error, n), "{level:?} {i}");
+                    }
+                }
+            }
+            assert!(left > 2, "none within");
+        }
+    }
+}
