@@ -5,8 +5,9 @@
 //! vectors of the processor ([`Kernel`]): random numbers, surfaces, points of lamps, scattered directions. Between them, path by path: rays,
 //! spectra, roulette.
 //!
-//! Only what is common is computed in lanes: flat triangles, diffuse surfaces and rough metals, rectangular lamps. For the rest each vertex is asked alone,
-//! by the functions that [`PathIntegrator::follow`] calls, and its answers are put into the lanes. That loop stays the specification.
+//! Only what is common is computed in lanes: flat triangles, diffuse surfaces and rough metals, the light tree, rectangular and spherical lamps, an image of
+//! the sky. For the rest each vertex is asked alone, by the functions that [`PathIntegrator::follow`] calls, and its answers are put into the
+//! lanes. That loop stays the specification.
 //!
 //! In reading order: this file (the walk), `batch` (what paths carry), `lamps` (light of lamps, met and sampled), `kernels` (the stages in
 //! lanes).
