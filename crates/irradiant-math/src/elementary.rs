@@ -232,14 +232,11 @@ pub(crate) fn atan2_core(y: f64, x: f64) -> f64 {
     let turned = low > 0.414_213_562_373_095 * high;
     let (numerator, denominator) = if turned { (low - high, low + high) } else { (low, high) };
     let base = if turned { std::f64::consts::FRAC_PI_4 } else { 0.0 };
-    let t = if denominator == 0.0 { 0.0 } else { numerator / denominator };
-    let mut angle = base + atan_core(t);
-    if ay > ax {
-        angle = std::f64::consts::FRAC_PI_2 - angle;
-    }
-    if x.is_sign_negative() {
-        angle = std::f64::consts::PI - angle;
-    }
+    let quotient = numerator / denominator;
+    let t = if denominator == 0.0 { 0.0 } else { quotient };
+    let angle = base + atan_core(t);
+    let angle = if ay > ax { std::f64::consts::FRAC_PI_2 - angle } else { angle };
+    let angle = if x.is_sign_negative() { std::f64::consts::PI - angle } else { angle };
     angle.copysign(y)
 }
 
@@ -313,7 +310,7 @@ pub fn safe_acos(x: f32) -> f32 {
 }
 
 /// sqrt(max(0, x)): for squares that rounding pushed below zero. 0 for NaN.
-#[inline]
+#[inline(always)]
 pub fn safe_sqrt(x: f32) -> f32 {
     x.max(0.0).sqrt()
 }

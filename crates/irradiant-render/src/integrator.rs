@@ -75,11 +75,19 @@ impl AddAssign<&RenderStats> for RenderStats {
     }
 }
 
+/// Takes a unit's samples and adds them to a tile: [`Integrator::renderer`].
+pub type Renderer<'a> = Box<dyn FnMut(&WorkUnit, &mut FilmTile, &mut RenderStats) + 'a>;
+
 /// An estimator of the picture. Strangers may write one; ours are in [`crate::path`] and its neighbours.
 pub trait Integrator: Send + Sync {
     /// Takes the unit's samples and adds them to `tile` (whose bounds are the unit's). A sample is a pure function of
     /// (scene, settings, pixel, sample index), whatever the unit that it comes in.
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats);
+
+    /// What one thread calls for each of its units: does what [`Integrator::render`] does, and may keep memory from one unit to the next.
+    fn renderer<'a>(&'a self, scene: &'a Scene) -> Renderer<'a> {
+        Box::new(move |unit, tile, stats| self.render(scene, unit, tile, stats))
+    }
 
     /// The most samples of one pixel that a work unit is to have, 1 or more. Small numbers are for estimators whose samples
     /// of one index have something in common that takes time to make ([`crate::photon`]): all units of an index then come

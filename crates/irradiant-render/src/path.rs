@@ -8,8 +8,8 @@
 //! Here is one path at a time, which is the specification and what recorders see; plain pictures go by the
 //! stages of `staged_path`, the same bits.
 
-use crate::camera_samples::{CameraSample, for_each_batch, for_each_first_hit};
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::camera_samples::{CameraSample, SampleBatch, for_each_first_hit};
+use crate::integrator::{Integrator, Limit, RenderStats, Renderer, WorkUnit};
 use crate::light_samples::{MOST_SPLITS, check_splits, direct_light, samples_of};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
@@ -68,10 +68,7 @@ impl Default for PathIntegrator {
 impl Integrator for PathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
         if self.has_stages(scene) {
-            let mut batch = Batch::new(scene);
-            for_each_batch(scene, unit, tile, stats, |samples, hits, radiance, stats| {
-                self.radiance_of_batch(&mut batch, scene, samples, hits, radiance, stats);
-            });
+            self.renderer(scene)(unit, tile, stats);
             return;
         }
         // Under a sky, the first lookups of many paths are prepared together, since they wait for memory; in vain where
@@ -104,6 +101,18 @@ impl Integrator for PathIntegrator {
                 self.radiance_from(first, scene, camera_ray, &sample.stream, lambda, layers, stats, &mut NoRecord)
             },
         );
+    }
+
+    fn renderer<'a>(&'a self, scene: &'a Scene) -> Renderer<'a> {
+        if !self.has_stages(scene) {
+            return Box::new(move |unit, tile, stats| self.render(scene, unit, tile, stats));
+        }
+        let (mut paths, mut batch) = (Batch::new(scene), SampleBatch::new(scene));
+        Box::new(move |unit, tile, stats| {
+            batch.for_each(scene, unit, tile, stats, |samples, hits, radiance, stats| {
+                self.radiance_of_batch(&mut paths, scene, samples, hits, radiance, stats);
+            });
+        })
     }
 
     fn check(&self, _: &Scene) -> Result<(), String> {

@@ -38,8 +38,10 @@ impl SampledSpectrum {
 
     /// `f` of each lane.
     #[inline]
-    pub fn map(self, f: impl FnMut(f32) -> f32) -> Self {
-        Self(self.0.map(f))
+    pub fn map(self, mut f: impl FnMut(f32) -> f32) -> Self {
+        // Written out: the array's own is sometimes called rather than inlined.
+        let [a, b, c, d] = self.0;
+        Self([f(a), f(b), f(c), f(d)])
     }
 
     /// `f` of each pair of lanes.

@@ -101,6 +101,85 @@ fn several_light_samples() {
     assert_same_by(&PathIntegrator { light_splits: 8, ..PathIntegrator::default() }, &text);
 }
 
+/// A spherical lamp.
+fn ball(parameters: &str, center: [f32; 3], radius: f32) -> String {
+    let [x, y, z] = center;
+    format!(
+        "AttributeBegin\nMaterial \"diffuse\" \"rgb reflectance\" [ .1 .1 .1 ]\nAreaLightSource \"diffuse\" {parameters}\nTranslate {x} {y} {z}\nShape \"sphere\" \"float radius\" {radius}\nAttributeEnd\n"
+    )
+}
+
+/// A plate of metal on the floor, in which lamps are seen.
+fn plate(roughness: f32) -> String {
+    format!(
+        "Material \"conductor\" \"float roughness\" {roughness}\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ -.9 .1 -.8  .9 .1 -.8  .9 .3 .8  -.9 .3 .8 ]\n"
+    )
+}
+
+// Small and large ones, two-sided, one that shines inwards around everything, one that walls cut; metals find them by themselves.
+#[test]
+fn spherical_lamps_over_metal() {
+    let lamps = [
+        ball("\"rgb L\" [ 900 900 900 ]", [-0.6, 1.2, 0.1], 0.02),
+        ball("\"rgb L\" [ 8 4 2 ] \"bool twosided\" true", [0.4, 0.9, 0.3], 0.25),
+        ball("\"rgb L\" [ 2 9 3 ]", [0.0, 1.9, 0.2], 0.3),
+        format!("ReverseOrientation\n{}ReverseOrientation\n", ball("\"rgb L\" [ .3 .3 .4 ]", [0.0, 1.0, -1.0], 8.0)),
+        ball("\"rgb L\" [ 5 1 5 ]", [0.7, 1.5, 0.0], 0.1)
+            .replace("\"float radius\"", "\"float alpha\" 0.5 \"float radius\""),
+    ];
+    for count in [1, 5] {
+        assert_same(&format!("{HEAD}{ROOM}{}{}{}", plate(0.02), plate(0.3), lamps[..count].concat()));
+    }
+}
+
+// Paths part in the tree at once, and come to their lights at different levels.
+#[test]
+fn hundreds_of_lamps() {
+    let lamps: String = (0..300)
+        .map(|i| {
+            let place = |k: u32| (i as f32 * [0.618_034, 0.754_878, 0.569_84][k as usize]).fract();
+            let (x, y, z) = (1.8 * place(0) - 0.9, 0.4 + 1.4 * place(1), 1.8 * place(2) - 0.9);
+            match i % 3 {
+                0 => lamp("\"rgb L\" [ 5 4 3 ]", x, y, z, 0.02),
+                1 => ball("\"rgb L\" [ 3 4 5 ]", [x, y, z], 0.015),
+                _ => format!("LightSource \"point\" \"rgb I\" [ .002 .002 .001 ] \"point3 from\" [ {x} {y} {z} ]\n"),
+            }
+        })
+        .collect();
+    assert_same(&format!("{HEAD}{ROOM}{}{lamps}", plate(0.1)));
+    // With lights at infinity, which are picked before the tree is asked.
+    assert_same(&format!(
+        "{HEAD}LightSource \"distant\" \"rgb L\" [ .5 .5 .5 ]\nLightSource \"infinite\" \"rgb L\" [ .1 .2 .3 ]\n{ROOM}{}{lamps}",
+        plate(0.1)
+    ));
+}
+
+/// An uneven sky of 16 by 16 pixels.
+fn sky_file() -> String {
+    let image = irradiant::image::Image::from_fn(16, 16, ["R", "G", "B"], |x, y| {
+        [0, 1, 2].map(|c| ((x * 111 + y * 1776 + c * 37) % 101) as f32 / 50.0)
+    });
+    let path = std::env::temp_dir().join(format!("irradiant-staged-sky-{}.exr", std::process::id()));
+    let bytes = irradiant::image::write(&image, irradiant::image::FileFormat::Exr).expect("writable");
+    std::fs::write(&path, bytes).expect("a file");
+    path.display().to_string().replace('\\', "/")
+}
+
+// Alone, where it needs no picking; turned and squeezed, with a lamp beside it.
+#[test]
+fn under_an_image_of_the_sky() {
+    let file = sky_file();
+    let sky = format!("LightSource \"infinite\" \"string filename\" \"{file}\" \"float scale\" 0.5\n");
+    let smooth = "Material \"diffuse\" \"rgb reflectance\" [ .4 .5 .6 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \"point3 P\" [ -.5 .3 0  .4 .3 .1  .4 .9 .3  -.5 .9 .2 ] \"normal N\" [ -.4 -.2 -1  .3 0 -1  .2 .3 -1  0 0 -1 ] \"point2 uv\" [ 0 0 1 0 1 1 0 1 ]\nMaterial \"dielectric\"\nTranslate 0.4 0.5 -0.5\nShape \"sphere\" \"float radius\" 0.3\n";
+    assert_same(&format!("{HEAD}{sky}{ROOM}{}{smooth}", plate(0.2)));
+    assert_same(&format!(
+        "{HEAD}AttributeBegin\nRotate 50 1 2 .5\nScale 1 .6 1\n{sky}AttributeEnd\n{ROOM}{}{}{smooth}",
+        ceiling_lamp(),
+        plate(0.05)
+    ));
+    std::fs::remove_file(&file).expect("removed");
+}
+
 #[test]
 fn mixed_materials_textures_and_relief() {
     assert_same(&format!(

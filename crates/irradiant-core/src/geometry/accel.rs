@@ -279,6 +279,9 @@ impl<A: AlphaTextures> GroupLeaves<'_, A> {
                 let s = &shapes.spheres[sphere as usize];
                 let single = to_ray(ray);
                 let (o, d) = s.placement.ray_to_shape(&single);
+                if s.is_clearly_missed(o, d, ray.t_max) {
+                    return None;
+                }
                 let roots = s.roots(o, d)?;
                 (0..2).find_map(|i| {
                     let t = roots[i];

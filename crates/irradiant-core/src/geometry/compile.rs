@@ -12,6 +12,7 @@ use super::instance::{Instance, Motion};
 use super::placement::Placement;
 use super::sphere::Sphere;
 use super::triangle::{Dropped, Mesh};
+use super::triangle_lanes::FlatTriangle;
 use super::{Emitter, Geometry};
 use crate::interaction::{LightId, MaterialId, ShapeId};
 use irradiant_bvh as bvh;
@@ -70,8 +71,9 @@ pub fn compile_geometry(
     c.groups[0] = Some(top);
     let Compiler { shapes, groups, emitters, face_emitters, .. } = c;
     let lights = face_emitters.iter().map(|&i| Some(LightId(i))).collect();
-    let groups = groups.into_iter().flatten().collect();
-    Geometry { level: bvh::Level::detect(), shapes, groups, emitters, face_emitters, lights }
+    let groups: Vec<Group> = groups.into_iter().flatten().collect();
+    let flat_triangles = FlatTriangle::all(&shapes, &groups[0]);
+    Geometry { level: bvh::Level::detect(), shapes, groups, flat_triangles, emitters, face_emitters, lights }
 }
 
 /// What will stand in one tree.

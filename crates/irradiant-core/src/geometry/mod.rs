@@ -33,7 +33,7 @@ mod triangle_lanes;
 
 pub use accel::Alpha;
 pub use compile::compile_geometry;
-pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample};
+pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample, SphereLanes};
 
 pub use irradiant_bvh::{Kernel, Level};
 pub(crate) use spawn::segment;
@@ -44,6 +44,7 @@ use accel::{Group, GroupLeaves, NO_EMITTER, Shapes, User, to_tree};
 use irradiant_bvh as bvh;
 use irradiant_math::{Bounds3, Ray};
 use irradiant_scene::desc::FloatTextureRef;
+use triangle_lanes::FlatTriangle;
 
 /// Evaluates opacity textures for hits that depend on them.
 pub trait AlphaTextures {
@@ -128,6 +129,8 @@ pub struct Geometry {
     pub(crate) shapes: Shapes,
     /// The scene itself, then objects and moving shapes.
     pub(crate) groups: Vec<Group>,
+    /// The triangles of the scene itself, where they are few, for hits that are looked at in lanes.
+    flat_triangles: Vec<Option<FlatTriangle>>,
     emitters: Vec<Emitter>,
     /// The emitter of each face of each emitting shape, and its light.
     face_emitters: Vec<u32>,
@@ -384,6 +387,7 @@ impl Geometry {
             + size_of_val(&s.cylinders[..])
             + size_of_val(&s.instances[..])
             + size_of_val(&s.infos[..])
+            + size_of_val(&self.flat_triangles[..])
             + self
                 .groups
                 .iter()

@@ -11,6 +11,9 @@ use std::f32::consts::TAU;
 /// Candidate ray parameters, nearer first.
 pub(crate) type Roots = [f64; 2];
 
+/// What a ray misses by this share of its squared distance from the centre it misses whatever was rounded: 10^6 roundings.
+const CLEARLY: f64 = 1e-10;
+
 /// A sphere of shape space with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Sphere {
@@ -55,6 +58,20 @@ impl Sphere {
     #[inline]
     pub fn roots(&self, o: Double3, d: Double3) -> Option<Roots> {
         quadric_roots(dot(d, d), dot(o, d), length(o), self.radius, |t| length(add(o, scale(d, t))))
+    }
+
+    /// True when no root, as it is computed and rounded, is one of 0 to `t_max`: without roots and quotients. Most rays that meet the box do
+    /// not meet the sphere: they pass it, or end before it, as those do that ask for what is in the way of its light.
+    #[inline]
+    pub fn is_clearly_missed(&self, o: Double3, d: Double3, t_max: f32) -> bool {
+        let (a, b, c) = (dot(d, d), dot(o, d), dot(o, o));
+        let end = add(o, scale(d, t_max as f64));
+        // Not the sphere but a larger one, by far more than is rounded.
+        let limit = self.radius * self.radius + CLEARLY * c;
+        let passes = c * a - b * b > limit * a;
+        let ends_before = (dot(end, end) > limit) & (dot(end, d) < 0.0);
+        let starts_behind = (c > limit) & (b > 0.0);
+        passes | ends_before | starts_behind
     }
 
     /// The point at `t`, brought back to the sphere, unless it is cut off.
@@ -132,4 +149,35 @@ pub(crate) fn quadric_roots(a: f64, b: f64, o: f64, r: f64, distance_at: impl Fn
         (q / a, if q == 0.0 { 0.0 } else { c / q })
     };
     Some(if t0 <= t1 { [t0, t1] } else { [t1, t0] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use irradiant_testkit::Rng;
+
+    // Rays towards, past, from within and from the surface itself; ends before, on and behind it.
+    #[test]
+    fn what_is_clearly_missed_has_no_root_in_reach() {
+        let mut rng = Rng::new(9);
+        let placement = Placement::new(&irradiant_math::Transform::IDENTITY, false).expect("the identity is affine");
+        let sphere = Sphere::new(1.0, -1.0, 1.0, 360.0, placement);
+        let (mut missed, mut told) = (0, 0);
+        for i in 0..400_000 {
+            let distance = [0.0, 0.5, 1.0, 1.0 + 1e-7, 1.5, 30.0, 1e4][i % 7];
+            let (o, to) = (rng.direction().map(f64::from), rng.direction().map(f64::from));
+            let o = scale(o, distance);
+            // Many of them graze.
+            let aim = if i % 2 == 0 { scale(to, 1.0 + 1e-6 * (rng.next_f32() as f64 - 0.5)) } else { scale(to, 1.3) };
+            let d = add(aim, scale(o, -1.0));
+            let t_max = [f32::INFINITY, 1.0, 0.999_999, rng.next_f32()][i / 7 % 4];
+            let within = |t: f64| t > 0.0 && (t as f32) > 0.0 && (t as f32) < t_max;
+            let is_met = sphere.roots(o, d).is_some_and(|roots| roots.into_iter().any(within));
+            let is_told = sphere.is_clearly_missed(o, d, t_max);
+            assert!(!(is_met && is_told), "{o:?} {d:?} {t_max}");
+            missed += u32::from(!is_met);
+            told += u32::from(is_told);
+        }
+        assert!(told as f64 > 0.5 * missed as f64, "{told} of {missed}");
+    }
 }

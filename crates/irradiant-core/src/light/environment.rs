@@ -152,13 +152,32 @@ impl ImageInfiniteLight {
         Some(self.light_from(self.density(mode).arrive(&self.image, run)?, lambda))
     }
 
+    /// The last, but for what [`ImageInfiniteLight::direction`] says of it.
+    #[inline]
+    pub(super) fn arrive_at(
+        &self,
+        run: PixelRun,
+        lambda: &Wavelengths,
+        mode: SampleMode,
+    ) -> Option<(PixelSample, SampledSpectrum)> {
+        let sample = self.density(mode).arrive(&self.image, run)?;
+        Some((sample, self.radiance(sample.rgb, lambda)))
+    }
+
+    /// The direction to a point of the image, and the density with which it is drawn where that of the point is `pdf`.
+    #[inline(always)]
+    pub(super) fn direction(&self, uv: Point2, pdf: f32) -> (Vec3, f32) {
+        let w = warp::equal_area_square_to_sphere(uv);
+        (self.orientation.to_render(w), pdf / (4.0 * PI * self.orientation.stretch(w)))
+    }
+
     #[inline]
     fn light_from(&self, s: PixelSample, lambda: &Wavelengths) -> LightSample {
-        let w = warp::equal_area_square_to_sphere(s.uv);
+        let (wi, pdf) = self.direction(s.uv, s.pdf);
         LightSample {
             radiance: self.radiance(s.rgb, lambda),
-            wi: self.orientation.to_render(w),
-            pdf: s.pdf / (4.0 * PI * self.orientation.stretch(w)),
+            wi,
+            pdf,
             target: LightTarget::Infinite,
             is_delta: false,
             alpha: None,
@@ -168,9 +187,21 @@ impl ImageInfiniteLight {
     /// The point of the image that a ray in this direction sees, whose memory is asked for: looking up a sky is waiting.
     #[inline]
     pub fn place(&self, direction: Vec3) -> Point2 {
-        let uv = warp::equal_area_sphere_to_square(self.orientation.to_light(direction));
-        self.image.prefetch(uv);
+        let uv = self.place_of(direction);
+        self.prefetch(uv);
         uv
+    }
+
+    /// As [`ImageInfiniteLight::place`], without asking for its memory.
+    #[inline(always)]
+    pub(super) fn place_of(&self, direction: Vec3) -> Point2 {
+        warp::equal_area_sphere_to_square(self.orientation.to_light(direction))
+    }
+
+    /// Asks for the memory of a point of the image.
+    #[inline]
+    pub fn prefetch(&self, uv: Point2) {
+        self.image.prefetch(uv);
     }
 
     #[inline]

@@ -27,6 +27,7 @@ pub mod origin;
 pub mod point;
 pub mod portal;
 pub mod projection;
+mod sky_lanes;
 pub mod spot;
 mod target_lanes;
 
@@ -48,6 +49,7 @@ pub use origin::{LightOrigin, LightOrigins};
 pub use point::PointLight;
 pub use portal::PortalInfiniteLight;
 pub use projection::ProjectionLight;
+pub use sky_lanes::{SkyLanes, places_of_sky};
 pub use spot::SpotLight;
 pub use target_lanes::TargetLanes;
 

@@ -17,7 +17,7 @@ fn rows(m: &[[f64; 4]; 4]) -> [Vec3; 3] {
     std::array::from_fn(|i| Vec3::new(m[i][0] as f32, m[i][1] as f32, m[i][2] as f32))
 }
 
-#[inline]
+#[inline(always)]
 fn apply(m: &[Vec3; 3], v: Vec3) -> Vec3 {
     Vec3::new(m[0].dot(v), m[1].dot(v), m[2].dot(v))
 }
@@ -47,13 +47,13 @@ impl Orientation {
     }
 
     /// A render-space direction in light space, unit.
-    #[inline]
+    #[inline(always)]
     pub fn to_light(&self, w: Vec3) -> Vec3 {
         apply(&self.light_from_render, w).normalize()
     }
 
     /// A light-space direction in render space, unit.
-    #[inline]
+    #[inline(always)]
     pub fn to_render(&self, w: Vec3) -> Vec3 {
         apply(&self.render_from_light, w).normalize()
     }
@@ -61,7 +61,7 @@ impl Orientation {
     /// Solid angle in render space for a unit of it in light space, around the unit light-space direction `w`.
     ///
     /// 1 for rotations, mirrors and uniform scales; |det M| / |M w|^3 for the rest (pbrt-v4 takes 1 always).
-    #[inline]
+    #[inline(always)]
     pub fn stretch(&self, w: Vec3) -> f32 {
         if self.keeps_angles {
             return 1.0;

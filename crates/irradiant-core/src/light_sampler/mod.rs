@@ -7,6 +7,7 @@
 
 pub mod exhaustive;
 pub mod tree;
+mod tree_lanes;
 
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ use irradiant_math::distribution::AliasTable;
 use irradiant_scene::desc::LightSamplerKind;
 use irradiant_spectrum::Wavelengths;
 use tree::TreeSampler;
+pub use tree_lanes::{PointLanes, TreeLanes};
 
 /// A light that was picked.
 #[derive(Clone, Copy, Debug, PartialEq)]

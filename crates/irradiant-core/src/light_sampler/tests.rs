@@ -55,12 +55,12 @@ fn random_lights(n: usize, infinite: usize, seed: u64) -> Lights {
     Lights::new(list)
 }
 
-fn random_reference(rng: &mut Rng) -> ReferencePoint {
+pub(super) fn random_reference(rng: &mut Rng) -> ReferencePoint {
     let n = if rng.next_f32() < 0.2 { Normal3::ZERO } else { unit(rng.direction()).as_normal() };
     ReferencePoint { p: random_point(rng, 14.0), p_error: Vec3::ZERO, n, ns: n }
 }
 
-fn samplers(n: usize, infinite: usize, seed: u64) -> (Lights, Vec<LightSampler>) {
+pub(super) fn samplers(n: usize, infinite: usize, seed: u64) -> (Lights, Vec<LightSampler>) {
     let lights = random_lights(n, infinite, seed);
     let samplers = KINDS.map(|k| LightSampler::new(k, &lights)).into();
     (lights, samplers)

@@ -9,88 +9,172 @@ use super::{Infinite, Part, PickedLight};
 use crate::interaction::{LightId, ReferencePoint};
 use crate::light::{Light, LightBounds};
 use irradiant_math::{Bounds3, Normal3, Point3};
+use std::ops::{Add, Div, Mul, Sub};
 
-const WIDTH: usize = 4;
+/// Children of a node.
+pub(super) const WIDTH: usize = 4;
 const BUCKETS: usize = 12;
 /// Marks children that are lights.
-const LEAF: u32 = 1 << 31;
+pub(super) const LEAF: u32 = 1 << 31;
 
-type Lanes = [f32; WIDTH];
+/// A number of each child.
+pub(super) type Lanes = [f32; WIDTH];
+
+/// Where lights are, which way they shine and how much: of one group of lights, or of several side by side.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(16))]
+pub(super) struct Cones<T> {
+    center: [T; 3],
+    radius_squared: T,
+    /// See [`LightBounds::least_distance_squared`].
+    least: T,
+    axis: [T; 3],
+    cos_normals: T,
+    sin_normals: T,
+    cos_emission: T,
+    /// 1 where emission goes to both sides.
+    two_sided: T,
+    power: T,
+}
+
+impl<T: Copy> Cones<T> {
+    /// All the same.
+    pub const fn splat(x: T) -> Self {
+        Self {
+            center: [x; 3],
+            radius_squared: x,
+            least: x,
+            axis: [x; 3],
+            cos_normals: x,
+            sin_normals: x,
+            cos_emission: x,
+            two_sided: x,
+            power: x,
+        }
+    }
+
+    /// Something of each number.
+    #[inline(always)]
+    pub fn of<U>(&self, f: impl Fn(&T) -> U) -> Cones<U> {
+        Cones {
+            center: [f(&self.center[0]), f(&self.center[1]), f(&self.center[2])],
+            radius_squared: f(&self.radius_squared),
+            least: f(&self.least),
+            axis: [f(&self.axis[0]), f(&self.axis[1]), f(&self.axis[2])],
+            cos_normals: f(&self.cos_normals),
+            sin_normals: f(&self.sin_normals),
+            cos_emission: f(&self.cos_emission),
+            two_sided: f(&self.two_sided),
+            power: f(&self.power),
+        }
+    }
+
+    /// Puts each number of others into its place here.
+    #[inline(always)]
+    pub fn put<U>(&mut self, from: &Cones<U>, f: impl Fn(&mut T, &U)) {
+        for i in 0..3 {
+            f(&mut self.center[i], &from.center[i]);
+            f(&mut self.axis[i], &from.axis[i]);
+        }
+        f(&mut self.radius_squared, &from.radius_squared);
+        f(&mut self.least, &from.least);
+        f(&mut self.cos_normals, &from.cos_normals);
+        f(&mut self.sin_normals, &from.sin_normals);
+        f(&mut self.cos_emission, &from.cos_emission);
+        f(&mut self.two_sided, &from.two_sided);
+        f(&mut self.power, &from.power);
+    }
+}
+
+impl<T: Number> Cones<T> {
+    /// [`LightBounds::importance`] at a point of this normal, zero for none.
+    #[inline(always)]
+    pub fn importance(&self, p: [T; 3], n: [T; 3], has_normal: bool) -> T {
+        let d = [p[0] - self.center[0], p[1] - self.center[1], p[2] - self.center[2]];
+        let (zero, one) = (T::splat(0.0), T::splat(1.0));
+        let distance_squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let inverse = one / distance_squared.greater(T::splat(f32::MIN_POSITIVE)).root();
+        let axis = self.axis;
+        let cos_w = (axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2]) * inverse;
+        let cos_w = self.two_sided.select_if_positive(cos_w.magnitude(), cos_w);
+        let sin_w = (one - cos_w * cos_w).greater(zero).root();
+
+        let outside = distance_squared - self.radius_squared;
+        let sin2_b = self.radius_squared * (inverse * inverse);
+        let cos_b = outside.select_if_positive((one - sin2_b).greater(zero).root(), T::splat(-1.0));
+        let sin_b = outside.select_if_positive(sin2_b.root(), zero);
+
+        let (cos_o, sin_o) = (self.cos_normals, self.sin_normals);
+        let within = cos_w - cos_o;
+        let cos_x = within.select_if_positive(one, cos_w * cos_o + sin_w * sin_o);
+        let sin_x = within.select_if_positive(zero, sin_w * cos_o - cos_w * sin_o);
+        let cos_p = (cos_x - cos_b).select_if_positive(one, cos_x * cos_b + sin_x * sin_b);
+
+        let importance = self.power * cos_p / distance_squared.greater(self.least);
+        let importance = (cos_p - self.cos_emission).select_if_positive(importance.greater(zero), zero);
+        let cos_i = ((d[0] * n[0] + d[1] * n[1] + d[2] * n[2]) * inverse).magnitude();
+        let sin_i = (one - cos_i * cos_i).greater(zero).root();
+        let facing = (cos_i - cos_b).select_if_positive(one, cos_i * cos_b + sin_i * sin_b);
+        let faced = importance * facing.greater(zero);
+        if has_normal { faced } else { importance }
+    }
+}
 
 /// Four children; absent ones have power 0.
 #[derive(Clone, Debug)]
 #[repr(align(16))]
-struct Node {
-    center: [Lanes; 3],
-    radius_squared: Lanes,
-    /// See [`LightBounds::least_distance_squared`].
-    least: Lanes,
-    axis: [Lanes; 3],
-    cos_normals: Lanes,
-    sin_normals: Lanes,
-    cos_emission: Lanes,
-    /// 1 where emission goes to both sides.
-    two_sided: Lanes,
-    power: Lanes,
-    children: [u32; WIDTH],
-    parent: Place,
+pub(super) struct Node {
+    pub cones: Cones<Lanes>,
+    pub children: [u32; WIDTH],
+    pub parent: Place,
 }
 
 /// A lane of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Place {
-    node: u32,
-    lane: u32,
+pub(super) struct Place {
+    pub node: u32,
+    pub lane: u32,
 }
 
 impl Place {
     /// Of the root's parent, and of lights that are in no node.
-    const NONE: Self = Self { node: u32::MAX, lane: 0 };
+    pub const NONE: Self = Self { node: u32::MAX, lane: 0 };
 }
 
 /// Picks by a tree of bounds.
 #[derive(Clone, Debug)]
 pub struct TreeSampler {
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     /// Where each light is.
-    places: Vec<Place>,
+    pub(super) places: Vec<Place>,
     /// Which lights are at infinity.
-    at_infinity: Vec<bool>,
-    infinite: Infinite,
+    pub(super) at_infinity: Vec<bool>,
+    pub(super) infinite: Infinite,
 }
 
 impl Node {
     fn new(parent: Place) -> Self {
-        let zero = [0.0; WIDTH];
-        Self {
-            center: [zero; 3],
-            radius_squared: zero,
-            least: [1.0; WIDTH],
-            axis: [zero; 3],
-            cos_normals: zero,
-            sin_normals: zero,
-            cos_emission: [2.0; WIDTH],
-            two_sided: zero,
-            power: zero,
-            children: [0; WIDTH],
-            parent,
-        }
+        let mut cones = Cones::splat([0.0; WIDTH]);
+        cones.least = [1.0; WIDTH];
+        cones.cos_emission = [2.0; WIDTH];
+        Self { cones, children: [0; WIDTH], parent }
     }
 
     fn set(&mut self, lane: usize, b: &LightBounds, child: u32) {
         let (center, axis) = (b.bounds.center(), b.axis);
         let radius = center.distance(b.bounds.max);
-        for (i, (c, a)) in center.to_array().into_iter().zip(axis.to_array()).enumerate() {
-            self.center[i][lane] = c;
-            self.axis[i][lane] = a;
-        }
-        self.radius_squared[lane] = radius * radius;
-        self.least[lane] = b.least_distance_squared();
-        self.cos_normals[lane] = b.cos_normals;
-        self.sin_normals[lane] = (1.0 - b.cos_normals * b.cos_normals).max(0.0).sqrt();
-        self.cos_emission[lane] = b.cos_emission;
-        self.two_sided[lane] = if b.two_sided { 1.0 } else { 0.0 };
-        self.power[lane] = b.power;
+        let one = Cones {
+            center: center.to_array(),
+            radius_squared: radius * radius,
+            least: b.least_distance_squared(),
+            axis: axis.to_array(),
+            cos_normals: b.cos_normals,
+            sin_normals: (1.0 - b.cos_normals * b.cos_normals).max(0.0).sqrt(),
+            cos_emission: b.cos_emission,
+            two_sided: if b.two_sided { 1.0 } else { 0.0 },
+            power: b.power,
+        };
+        self.cones.put(&one, |all, one| all[lane] = *one);
         self.children[lane] = child;
     }
 
@@ -100,40 +184,52 @@ impl Node {
     /// lanes stayed scalar (2.5 times slower).
     #[inline]
     fn importances(&self, p: Point3, n: Normal3) -> Lanes {
-        let d = [
-            Four::splat(p.x) - Four(self.center[0]),
-            Four::splat(p.y) - Four(self.center[1]),
-            Four::splat(p.z) - Four(self.center[2]),
-        ];
-        let one = Four::splat(1.0);
-        let distance_squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let inverse = one / distance_squared.max(Four::splat(f32::MIN_POSITIVE)).sqrt();
-        let axis = self.axis.map(Four);
-        let cos_w = (axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2]) * inverse;
-        let cos_w = Four(self.two_sided).select_if_positive(cos_w.abs(), cos_w);
-        let sin_w = (one - cos_w * cos_w).max(Four::ZERO).sqrt();
+        let splat = |v: [f32; 3]| [Four::splat(v[0]), Four::splat(v[1]), Four::splat(v[2])];
+        let cones = self.cones.of(|row| Four(*row));
+        cones.importance(splat(p.to_array()), splat(n.to_array()), n != Normal3::ZERO).0
+    }
+}
 
-        let radius_squared = Four(self.radius_squared);
-        let outside = distance_squared - radius_squared;
-        let sin2_b = radius_squared * (inverse * inverse);
-        let cos_b = outside.select_if_positive((one - sin2_b).max(Four::ZERO).sqrt(), Four::splat(-1.0));
-        let sin_b = outside.select_if_positive(sin2_b.sqrt(), Four::ZERO);
+/// What importances are computed with: one number, or several at once.
+pub(super) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// This number.
+    fn splat(x: f32) -> Self;
+    /// Square root.
+    fn root(self) -> Self;
+    /// Without its sign.
+    fn magnitude(self) -> Self;
+    /// The greater one; `b` if one is NaN.
+    fn greater(self, b: Self) -> Self;
+    /// `yes` where `self` > 0, else `no`.
+    fn select_if_positive(self, yes: Self, no: Self) -> Self;
+}
 
-        let (cos_o, sin_o) = (Four(self.cos_normals), Four(self.sin_normals));
-        let within = cos_w - cos_o;
-        let cos_x = within.select_if_positive(one, cos_w * cos_o + sin_w * sin_o);
-        let sin_x = within.select_if_positive(Four::ZERO, sin_w * cos_o - cos_w * sin_o);
-        let cos_p = (cos_x - cos_b).select_if_positive(one, cos_x * cos_b + sin_x * sin_b);
+impl Number for f32 {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        x
+    }
 
-        let importance = Four(self.power) * cos_p / distance_squared.max(Four(self.least));
-        let importance = (cos_p - Four(self.cos_emission)).select_if_positive(importance.max(Four::ZERO), Four::ZERO);
-        if n == Normal3::ZERO {
-            return importance.0;
-        }
-        let cos_i = ((d[0] * Four::splat(n.x) + d[1] * Four::splat(n.y) + d[2] * Four::splat(n.z)) * inverse).abs();
-        let sin_i = (one - cos_i * cos_i).max(Four::ZERO).sqrt();
-        let facing = (cos_i - cos_b).select_if_positive(one, cos_i * cos_b + sin_i * sin_b);
-        (importance * facing.max(Four::ZERO)).0
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn greater(self, b: Self) -> Self {
+        if self > b { self } else { b }
+    }
+
+    #[inline(always)]
+    fn select_if_positive(self, yes: Self, no: Self) -> Self {
+        if self > 0.0 { yes } else { no }
     }
 }
 
@@ -142,46 +238,45 @@ impl Node {
 struct Four(Lanes);
 
 impl Four {
-    const ZERO: Self = Self([0.0; WIDTH]);
+    #[inline(always)]
+    fn zip(self, b: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let (a, b) = (self.0, b.0);
+        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
+    }
+}
 
+impl Number for Four {
     #[inline(always)]
     fn splat(x: f32) -> Self {
         Self([x; WIDTH])
     }
 
     #[inline(always)]
-    fn zip(self, b: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        let (a, b) = (self.0, b.0);
-        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
+    fn root(self) -> Self {
         Self(self.0.map(f32::sqrt))
     }
 
     #[inline(always)]
-    fn abs(self) -> Self {
+    fn magnitude(self) -> Self {
         Self(self.0.map(f32::abs))
     }
 
     #[inline(always)]
-    fn max(self, b: Self) -> Self {
-        self.zip(b, |a, b| if a > b { a } else { b })
+    fn greater(self, b: Self) -> Self {
+        self.zip(b, f32::greater)
     }
 
-    /// `yes` in lanes where `self` > 0, else `no`.
     #[inline(always)]
     fn select_if_positive(self, yes: Self, no: Self) -> Self {
         let (s, y, n) = (self.0, yes.0, no.0);
-        let one = |i: usize| if s[i] > 0.0 { y[i] } else { n[i] };
+        let one = |i: usize| s[i].select_if_positive(y[i], n[i]);
         Self([one(0), one(1), one(2), one(3)])
     }
 }
 
 macro_rules! four_operators {
     ($($operator:ident $function:ident $symbol:tt;)*) => {$(
-        impl std::ops::$operator for Four {
+        impl $operator for Four {
             type Output = Self;
             #[inline(always)]
             fn $function(self, b: Self) -> Self {
@@ -193,9 +288,42 @@ macro_rules! four_operators {
 
 four_operators! { Add add +; Sub sub -; Mul mul *; Div div /; }
 
-#[inline]
-fn sum(v: &Lanes) -> f32 {
+#[inline(always)]
+pub(super) fn sum(v: &Lanes) -> f32 {
     (v[0] + v[1]) + (v[2] + v[3])
+}
+
+/// A step down.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    /// To which child; to none where no light reaches the point.
+    pub lane: u32,
+    pub is_good: bool,
+    /// With what probability.
+    pub share: f32,
+    /// What is left of the random number, in [0, 1).
+    pub u: f32,
+}
+
+/// Picks a child by `u` in [0, 1), in proportion to importance. Without branches.
+#[inline(always)]
+pub(super) fn choose(importances: &Lanes, u: f32) -> Step {
+    let total = sum(importances);
+    // Walk the lanes; the last one that is not empty takes what rounding leaves.
+    let target = u * total;
+    let (mut lane, mut below, mut reached, mut importance) = (0, 0.0, 0.0, 0.0);
+    let mut is_reached = false;
+    for (i, &next) in importances.iter().enumerate() {
+        let is_positive = next > 0.0;
+        let takes = is_positive & !is_reached;
+        lane = if takes { i as u32 } else { lane };
+        below = if takes { reached } else { below };
+        importance = if takes { next } else { importance };
+        reached += if is_positive { next } else { 0.0 };
+        is_reached |= takes & (target < reached);
+    }
+    let u = ((target - below) / importance).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+    Step { lane, is_good: total > 0.0, share: importance / total, u }
 }
 
 impl TreeSampler {
@@ -256,27 +384,13 @@ impl TreeSampler {
         };
         let mut node = self.nodes.first()?;
         loop {
-            let importances = node.importances(at.p, at.ns);
-            let total = sum(&importances);
-            if !(total > 0.0) {
+            let step = choose(&node.importances(at.p, at.ns), u);
+            if !step.is_good {
                 return None;
             }
-            // Walk the lanes; the last one that is not empty takes what rounding leaves.
-            let target = u * total;
-            let (mut lane, mut below, mut reached) = (usize::MAX, 0.0, 0.0);
-            for i in 0..WIDTH {
-                if importances[i] > 0.0 {
-                    (lane, below) = (i, reached);
-                    reached += importances[i];
-                    if target < reached {
-                        break;
-                    }
-                }
-            }
-            let importance = importances[lane];
-            pmf *= importance / total;
-            u = ((target - below) / importance).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
-            let child = node.children[lane];
+            pmf *= step.share;
+            u = step.u;
+            let child = node.children[step.lane as usize];
             if child & LEAF != 0 {
                 return (pmf > 0.0).then_some(PickedLight { id: LightId(child & !LEAF), pmf });
             }

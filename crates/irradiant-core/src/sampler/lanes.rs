@@ -1,6 +1,6 @@
 //! The random numbers of many samples side by side.
 
-use super::{BLOCKS_PER_VERTEX, CAMERA_BLOCKS, LightDraws, SampleStream, Source};
+use super::{BLOCKS_PER_VERTEX, CAMERA_BLOCKS, CameraDraws, LightDraws, SampleStream, Source};
 use irradiant_math::Point2;
 use irradiant_math::lanes::{Floats, LANES};
 use irradiant_math::sequence::owen_sobol_4d_lanes;
@@ -40,6 +40,18 @@ impl StreamLanes {
     #[inline(always)]
     pub fn shift(&mut self, to: usize, from: usize) {
         (self.reversed_index[to], self.seed[to]) = (self.reversed_index[from], self.seed[from]);
+    }
+
+    /// As [`SampleStream::camera`], of `n` lanes: place on the film, wavelength, time.
+    #[inline(always)]
+    pub fn camera(&self, n: usize, out: &mut BlockLanes) {
+        self.block(n, 0, out);
+    }
+
+    /// As [`SampleStream::lens`], of `n` lanes.
+    #[inline(always)]
+    pub fn lens(&self, n: usize, out: &mut BlockLanes) {
+        self.block(n, 1, out);
     }
 
     /// As [`SampleStream::light`], of `n` lanes.
@@ -85,6 +97,12 @@ impl BlockLanes {
     #[inline(always)]
     pub fn roulette(&self, i: usize) -> f32 {
         self.0[3][i]
+    }
+
+    /// A lane of a camera's block.
+    #[inline(always)]
+    pub fn camera_draws(&self, i: usize) -> CameraDraws {
+        CameraDraws { film: self.uv(i), wavelength: self.0[2][i], time: self.0[3][i] }
     }
 
     /// A lane of a light's block.

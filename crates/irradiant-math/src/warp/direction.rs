@@ -1,6 +1,6 @@
 //! Warps to directions: hemisphere, sphere, cone; spherical coordinates; the equal-area square.
 
-use crate::elementary::{ONE_MINUS_EPSILON, atan2, safe_acos, safe_sqrt, sin_cos};
+use crate::elementary::{ONE_MINUS_EPSILON, atan2, atan2_core, safe_acos, safe_sqrt, sin_cos, sin_cos_bounded};
 use crate::vector::{Point2, Vec3};
 use crate::warp::plane::{turn_fraction, uniform_disk_concentric, uniform_disk_concentric_inverse};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, TAU};
@@ -122,33 +122,34 @@ pub fn uniform_cone_inverse(v: Vec3, cos_theta_max: f32) -> Point2 {
 ///
 /// Clarberg 2008, "Fast equal-area mapping of the (hemi)sphere using SIMD". The centre is +z, the corners are -z, the
 /// middle of the right edge is +x and of the top edge (v = 1) +y; equal areas of the square are equal solid angles.
-/// Orientation as pbrt-v4's environment images.
-#[inline]
+/// Orientation as pbrt-v4's environment images. Without branches, as its inverse: loops over them become vector code.
+#[inline(always)]
 pub fn equal_area_square_to_sphere(p: Point2) -> Vec3 {
     let (u, v) = (2.0 * p.x - 1.0, 2.0 * p.y - 1.0);
     let (au, av) = (u.abs(), v.abs());
     // Signed distance from the diagonal: positive in the upper hemisphere.
     let signed = 1.0 - (au + av);
     let r = 1.0 - signed.abs();
-    let phi = if r == 0.0 { 1.0 } else { (av - au) / r + 1.0 } * (0.5 * FRAC_PI_2);
+    let share = (av - au) / r + 1.0;
+    let phi = if r == 0.0 { 1.0 } else { share } * (0.5 * FRAC_PI_2);
     let z = (1.0 - r * r).copysign(signed);
-    let (s, c) = sin_cos(phi);
+    let (s, c) = sin_cos_bounded(phi);
     let sin_theta = r * safe_sqrt(2.0 - r * r);
     Vec3::new((sin_theta * c.abs()).copysign(u), (sin_theta * s.abs()).copysign(v), z)
 }
 
 /// The point of the unit square that [`equal_area_square_to_sphere`] maps to the unit vector `d`.
-#[inline]
+#[inline(always)]
 pub fn equal_area_sphere_to_square(d: Vec3) -> Point2 {
     let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
     // sqrt(1 - z) as sin / sqrt(1 + z): the naive form has no digits near the poles.
     let r = ((x * x + y * y) / (1.0 + z)).sqrt().min(1.0);
-    let phi = if x == 0.0 && y == 0.0 { 0.0 } else { atan2(y, x) * (1.0 / FRAC_PI_2) };
-    let mut v = phi * r;
-    let mut u = r - v;
-    if d.z < 0.0 {
-        (u, v) = (1.0 - v, 1.0 - u);
-    }
+    // 0 at the poles.
+    let phi = atan2_core(y as f64, x as f64) as f32 * (1.0 / FRAC_PI_2);
+    let v = phi * r;
+    let u = r - v;
+    let is_below = d.z < 0.0;
+    let (u, v) = (if is_below { 1.0 - v } else { u }, if is_below { 1.0 - u } else { v });
     Point2::new(0.5 * (u.copysign(d.x) + 1.0), 0.5 * (v.copysign(d.y) + 1.0))
 }
 

@@ -10,6 +10,7 @@ pub(super) fn work(shared: &Shared) {
     let channels = lock(&shared.film).channels_per_pixel();
     let mut stats = RenderStats::default();
     let mut tile: Option<FilmTile> = None;
+    let mut render = shared.integrator.renderer(&shared.scene);
     while !shared.cancelled.load(Ordering::Relaxed) && shared.deadline.is_none_or(|d| Instant::now() < d) {
         let Some(unit) = shared.schedule.unit(shared.next.fetch_add(1, Ordering::Relaxed)) else { break };
         // Reuse the last tile's storage when the shape allows.
@@ -20,7 +21,7 @@ pub(super) fn work(shared: &Shared) {
             }
             _ => FilmTile::new(unit.bounds, channels),
         };
-        shared.integrator.render(&shared.scene, &unit, &mut current, &mut stats);
+        render(&unit, &mut current, &mut stats);
         lock(&shared.film).merge_tile(&current);
         let n = unit.bounds.area() as u64 * (unit.samples.end - unit.samples.start) as u64;
         shared.samples_done.fetch_add(n, Ordering::Relaxed);

@@ -1,7 +1,7 @@
 //! The vertices of some blocks' paths side by side, and what of their connections is computed in lanes: a block's sixteen first vertices are the
 //! lanes of a loop.
 
-use super::{Incoming, PIXELS, Scattered, Second};
+use super::{Incoming, PIXELS, Second};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::mirror_lobe;
 use irradiant_core::bxdf::fresnel::fresnel_conductor_at;
@@ -12,6 +12,7 @@ use irradiant_math::lanes::LANES;
 use irradiant_math::{Frame, Normal3, Point3, Vec3};
 use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum};
 use std::f32::consts::FRAC_1_PI;
+use std::ops::Range;
 
 /// Blocks whose paths go together at most.
 pub(super) const BLOCKS: usize = LANES / PIXELS;
@@ -168,6 +169,14 @@ impl Receivers {
         set_spectrum(&mut self.k, i, k);
     }
 }
+/// Light that leaves a second vertex, as [`Scattered`](super::Scattered).
+pub(crate) enum Leaving {
+    /// The same radiance in all directions of the side of this normal.
+    Evenly { normal: Vec3, radiance: SampledSpectrum },
+    /// As its BSDF has it, whose place this is: what arrives.
+    By { bsdf: u32, incoming: Range<usize> },
+}
+
 /// What the paths of some blocks leave for their own pixels and for one another's, by the places of their samples.
 pub(crate) struct Blocks {
     pub kinds: Vec<Kind>,
@@ -183,7 +192,9 @@ pub(crate) struct Blocks {
     /// Models of their own, and the directions from which the camera sees them.
     pub(super) alone: Vec<(Bsdf, Vec3)>,
     /// Second vertices that are shared; in the end, without those that no light leaves.
-    pub seconds: Vec<Option<Second>>,
+    pub seconds: Vec<Option<Second<Leaving>>>,
+    /// Of second vertices.
+    pub bsdfs: Vec<Bsdf>,
     /// What arrives at second vertices; in the end, one's after another's.
     pub incoming: Vec<(u32, Incoming)>,
 }
@@ -199,6 +210,7 @@ impl Blocks {
             receivers: vec![Receivers::NONE; BLOCKS],
             alone: Vec::new(),
             seconds: Vec::new(),
+            bsdfs: Vec::new(),
             incoming: Vec::new(),
         }
     }
@@ -219,6 +231,7 @@ impl Blocks {
             (receivers.is_metal, receivers.is_plain) = ([0; PIXELS], [0; PIXELS]);
         }
         self.alone.clear();
+        self.bsdfs.clear();
         self.seconds.clear();
         self.seconds.resize_with(samples, || None);
         self.incoming.clear();
@@ -270,7 +283,7 @@ impl Blocks {
                 Kind::Apart => self.own[s] += self.rest[s],
                 Kind::Own => self.own[s] += self.direct[s] + self.rest[s],
                 Kind::Evenly => {
-                    if let Some(Second { light: Scattered::Evenly { radiance, .. }, .. }) = &mut self.seconds[s] {
+                    if let Some(Second { light: Leaving::Evenly { radiance, .. }, .. }) = &mut self.seconds[s] {
                         *radiance = self.direct[s] + self.rest[s];
                     }
                 }
@@ -287,8 +300,7 @@ impl Blocks {
         let mut begin = 0;
         for of_one in self.incoming.chunk_by(|a, b| a.0 == b.0) {
             let end = begin + of_one.len();
-            if let Some(Second { light: Scattered::By { incoming, .. }, .. }) = &mut self.seconds[of_one[0].0 as usize]
-            {
+            if let Some(Second { light: Leaving::By { incoming, .. }, .. }) = &mut self.seconds[of_one[0].0 as usize] {
                 *incoming = begin..end;
             }
             begin = end;
@@ -296,8 +308,8 @@ impl Blocks {
         // Nobody needs to be asked whether he sees what is dark.
         for second in &mut self.seconds {
             let is_black = match second {
-                Some(Second { light: Scattered::Evenly { radiance, .. }, .. }) => radiance.is_black(),
-                Some(Second { light: Scattered::By { incoming, .. }, .. }) => {
+                Some(Second { light: Leaving::Evenly { radiance, .. }, .. }) => radiance.is_black(),
+                Some(Second { light: Leaving::By { incoming, .. }, .. }) => {
                     self.incoming[incoming.clone()].iter().all(|(_, light)| light.radiance.is_black())
                 }
                 None => false,

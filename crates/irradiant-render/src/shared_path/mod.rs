@@ -25,7 +25,7 @@ mod share;
 mod staged;
 
 use crate::camera_samples::{CameraSample, camera_sample_by};
-use crate::integrator::{Integrator, Limit, RenderStats, WorkUnit};
+use crate::integrator::{Integrator, Limit, RenderStats, Renderer, WorkUnit};
 use crate::light_samples::{check_splits, direct_light, pick_light};
 use crate::path::{PathIntegrator, Previous, Walk, lights_option, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
@@ -76,14 +76,14 @@ struct First {
 }
 
 /// A surface that a path meets next, with the light that it scatters (its own emission is not shared).
-pub(crate) struct Second {
+pub(crate) struct Second<L = Scattered> {
     pub place: ReferencePoint,
     pub wo: Vec3,
     /// Density with which its own path's first vertex found it, 1/sr.
     pub pdf: f32,
     /// What the path carries there: f cos / pdf.
     pub carried: SampledSpectrum,
-    pub light: Scattered,
+    pub light: L,
 }
 
 /// Light that leaves a surface.
@@ -137,11 +137,15 @@ struct Scratch<'a> {
 
 impl Integrator for SharedPathIntegrator {
     fn render(&self, scene: &Scene, unit: &WorkUnit, tile: &mut FilmTile, stats: &mut RenderStats) {
+        self.renderer(scene)(unit, tile, stats);
+    }
+
+    fn renderer<'a>(&'a self, scene: &'a Scene) -> Renderer<'a> {
         let path = self.path();
         if path.has_stages(scene) {
-            self.render_in_batches(&path, scene, unit, tile, stats);
+            staged::renderer(path, scene)
         } else {
-            self.render_alone(scene, unit, tile, stats);
+            Box::new(move |unit, tile, stats| self.render_alone(scene, unit, tile, stats))
         }
     }
 
@@ -510,15 +514,20 @@ fn blocks_of(bounds: &PixelBounds) -> impl Iterator<Item = PixelBounds> {
     })
 }
 
+/// A block's pixels, row by row.
+fn pixels_of(block: &PixelBounds) -> impl Iterator<Item = [i32; 2]> + use<> {
+    let PixelBounds { x0, x1, y0, y1 } = *block;
+    (y0..y1).flat_map(move |y| (x0..x1).map(move |x| [x, y]))
+}
+
 /// The samples of one index of a block's pixels, row by row. They share the time.
 fn samples_of_block<'a>(
     scene: &'a Scene,
     block: &PixelBounds,
     index: u32,
 ) -> impl Iterator<Item = CameraSample<'a>> + use<'a> {
-    let PixelBounds { x0, x1, y0, y1 } = *block;
-    let time = scene.sampler.stream([x0, y0], index).camera().time;
-    (y0..y1).flat_map(move |y| (x0..x1).map(move |x| [x, y])).map(move |pixel| {
+    let time = scene.sampler.stream([block.x0, block.y0], index).camera().time;
+    pixels_of(block).map(move |pixel| {
         let stream = scene.sampler.stream(pixel, index);
         camera_sample_by(scene, pixel, index, stream, CameraDraws { time, ..stream.camera() })
     })
@@ -533,7 +542,9 @@ fn film_rgb(
     shared: [f32; 3],
 ) -> [f32; 3] {
     let Some(camera_ray) = &sample.camera_ray else { return [0.0; 3] };
-    let own = scene.sensor_response(radiance * camera_ray.weight, lambda);
-    let response = std::array::from_fn(|c| own[c] + shared[c] * camera_ray.weight);
-    scene.film_rgb_of_response(response).map(|c| c * sample.filter_weight)
+    let [r, g, b] = scene.sensor_response(radiance * camera_ray.weight, lambda);
+    let [more_r, more_g, more_b] = shared;
+    let weight = camera_ray.weight;
+    let [r, g, b] = scene.film_rgb_of_response([r + more_r * weight, g + more_g * weight, b + more_b * weight]);
+    [r * sample.filter_weight, g * sample.filter_weight, b * sample.filter_weight]
 }

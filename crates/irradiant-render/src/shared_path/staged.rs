@@ -1,24 +1,23 @@
 //! Shared paths by the stages of `staged_path`, and the sum over a block in lanes: the same bits as one path at a time.
 
 use super::blocks::{
-    BLOCKS, Blocks, GiveByMetal, GiveEvenly, Meet, Meeting, Model, Respond, Sixteen, Spectra, set_spectrum, spectrum,
+    BLOCKS, Blocks, GiveByMetal, GiveEvenly, Leaving, Meet, Meeting, Model, Respond, Sixteen, Spectra, set_spectrum,
+    spectrum,
 };
-use super::{Incoming, PIXELS, Scattered, SharedPathIntegrator, blocks_of, film_rgb, samples_of_block};
-use crate::camera_samples::{CameraSample, gather};
-use crate::integrator::{RenderStats, WorkUnit};
+use super::{Incoming, PIXELS, blocks_of, film_rgb, pixels_of};
+use crate::camera_samples::{CameraSample, SampleBatch};
+use crate::integrator::{RenderStats, Renderer};
 use crate::path::PathIntegrator;
 use crate::staged_path::{Batch, Plain};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, TransportMode};
-use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::{Interaction, TextureContext};
 use irradiant_core::scene::Scene;
-use irradiant_math::lanes::LANES;
 use irradiant_math::{Ray, Vec3};
 use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 
-/// What batches need not allocate anew.
+/// What is needed to join the vertices of a batch, kept from one to the next.
 struct Joints {
     /// Of a block's second vertices with its first ones.
     meetings: Vec<Meeting>,
@@ -31,32 +30,14 @@ struct Joints {
     shared: Vec<[Sixteen; 3]>,
 }
 
-impl SharedPathIntegrator {
-    /// Takes a unit's samples, many at a time.
-    pub(super) fn render_in_batches(
-        &self,
-        path: &PathIntegrator,
-        scene: &Scene,
-        unit: &WorkUnit,
-        tile: &mut FilmTile,
-        stats: &mut RenderStats,
-    ) {
-        let mut batch = Batch::new(scene);
-        let mut blocks = Blocks::new();
-        let mut joints = Joints {
-            meetings: vec![Meeting::NONE; PIXELS],
-            rays: Vec::new(),
-            ends: Vec::new(),
-            blocked: Vec::new(),
-            places: Vec::new(),
-            shared: Vec::new(),
-        };
-        let mut samples: Vec<CameraSample> = Vec::with_capacity(BLOCKS * PIXELS);
-        let mut hits = [None; LANES];
-        let mut take = |samples: &mut Vec<CameraSample>| {
-            gather(samples, &mut joints.rays, &mut joints.ends);
-            let hits = &mut hits[..samples.len()];
-            scene.geometry.intersect_batch(&joints.rays, &joints.ends, &scene.alpha(), hits);
+/// Takes units' samples, many at a time, of a scene that has stages for `path`.
+pub(super) fn renderer<'a>(path: PathIntegrator, scene: &'a Scene) -> Renderer<'a> {
+    let (mut batch, mut samples) = (Batch::new(scene), SampleBatch::new(scene));
+    let (mut blocks, mut joints) = (Blocks::new(), Joints::new());
+    Box::new(move |unit, tile, stats| {
+        let mut take = |samples: &mut SampleBatch<'a>| {
+            samples.trace(scene, PIXELS);
+            let (samples, hits) = samples.traced();
             stats.camera_rays += samples.iter().filter(|sample| sample.camera_ray.is_some()).count() as u64;
             path.shared_batch(&mut batch, scene, samples, hits, &mut blocks, stats);
             joints.share(scene, samples, hits, &mut blocks, stats);
@@ -66,27 +47,47 @@ impl SharedPathIntegrator {
                     continue;
                 }
                 stats.paths += 1;
-                let shared = joints.shared[s / PIXELS].map(|c| c[s % PIXELS]);
+                let [r, g, b] = &joints.shared[s / PIXELS];
+                let shared = [r[s % PIXELS], g[s % PIXELS], b[s % PIXELS]];
                 let rgb = film_rgb(scene, sample, &sample.lambda, blocks.own[s], shared);
                 if !tile.add(x, y, rgb, &[]) {
                     stats.refuse(x, y, sample.index);
                 }
             }
-            samples.clear();
         };
+        // Batches of about the same size.
+        let all = blocks_of(&unit.bounds).count() * unit.samples.len();
+        let together = PIXELS * all.div_ceil(all.div_ceil(BLOCKS).max(1));
+        let mut n = 0;
         for block in blocks_of(&unit.bounds) {
             for index in unit.samples.clone() {
-                samples.extend(samples_of_block(scene, &block, index));
-                if samples.len() == BLOCKS * PIXELS {
+                for pixel in pixels_of(&block) {
+                    n = samples.put(scene, pixel, index);
+                }
+                if n == together {
                     take(&mut samples);
+                    n = 0;
                 }
             }
         }
-        take(&mut samples);
-    }
+        if n > 0 {
+            take(&mut samples);
+        }
+    })
 }
 
 impl Joints {
+    fn new() -> Self {
+        Self {
+            meetings: vec![Meeting::NONE; PIXELS],
+            rays: Vec::new(),
+            ends: Vec::new(),
+            blocked: Vec::new(),
+            places: Vec::new(),
+            shared: Vec::new(),
+        }
+    }
+
     /// Brings the light of all second vertices to all first ones of their blocks.
     fn share(
         &mut self,
@@ -131,7 +132,7 @@ impl Joints {
                     }
                 }
                 let (lambda, shared) = (&samples[begin + own].lambda, &mut self.shared[begin / PIXELS]);
-                give(scene, meeting, &second.light, &blocks.incoming, lambda, shared);
+                give(scene, meeting, &second.light, blocks, lambda, shared);
             }
         }
     }
@@ -142,8 +143,8 @@ impl Joints {
         let (begin, own) = (s / PIXELS * PIXELS, s % PIXELS);
         let receivers = &mut blocks.receivers[s / PIXELS];
         let side = match second.light {
-            Scattered::Evenly { normal, .. } => Some(normal),
-            Scattered::By { .. } => None,
+            Leaving::Evenly { normal, .. } => Some(normal),
+            Leaving::By { .. } => None,
         };
         let lambda = &samples[s].lambda;
         // In the RGB basis wavelengths are always the same.
@@ -230,8 +231,8 @@ fn scattered_at(
 fn give(
     scene: &Scene,
     meeting: &Meeting,
-    light: &Scattered,
-    arriving: &[(u32, Incoming)],
+    light: &Leaving,
+    blocks: &Blocks,
     lambda: &Wavelengths,
     sums: &mut [Sixteen; 3],
 ) {
@@ -250,12 +251,13 @@ fn give(
         }
     };
     match light {
-        Scattered::Evenly { radiance, .. } => {
+        Leaving::Evenly { radiance, .. } => {
             level.run(GiveEvenly { meeting, radiance: *radiance, out: &mut given });
             respond(&given);
         }
-        Scattered::By { bsdf, incoming } => {
-            for (_, light) in &arriving[incoming.clone()] {
+        Leaving::By { bsdf, incoming } => {
+            let bsdf = &blocks.bsdfs[*bsdf as usize];
+            for (_, light) in &blocks.incoming[incoming.clone()] {
                 match &bsdf.bxdf {
                     Bxdf::Conductor(metal) => {
                         level.run(GiveByMetal { meeting, frame: &bsdf.frame, metal, light, out: &mut given });

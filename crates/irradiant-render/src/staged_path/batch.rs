@@ -1,20 +1,21 @@
 //! The numbers of many paths side by side, between vertices and at them.
 
+use super::kernels::{PlacesOfBounces, PlacesOfCamera, Scatter};
 use crate::camera_samples::CameraSample;
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::MirrorLobe;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
-use irradiant_core::geometry::{Hit, RectangleLanes, SurfaceLanes, TriangleLanes};
+use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
-use irradiant_core::light::{PixelLine, PixelRun, TargetLanes};
-use irradiant_core::light_sampler::PickedLight;
+use irradiant_core::light::{ImageInfiniteLight, PixelLine, PixelRun, SkyLanes, TargetLanes};
+use irradiant_core::light_sampler::{PickedLight, TreeLanes};
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
 use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 use std::f32::consts::FRAC_1_PI;
 
 /// How a path's vertex scatters.
@@ -37,6 +38,18 @@ pub(super) enum Surface {
     Flat(MaterialId, Option<LightId>),
     /// Something else.
     Other,
+}
+
+/// A lamp that a path meets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MetLamp {
+    /// The path's lane.
+    pub lane: u32,
+    pub light: LightId,
+    /// Parameters of the place, as the hit reports them.
+    pub uv: Point2,
+    /// What leaves it towards the path, not black.
+    pub emitted: SampledSpectrum,
 }
 
 /// What a material is that is the same everywhere.
@@ -107,11 +120,22 @@ pub(crate) struct Batch {
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
 
+    // Light of lamps that paths meet.
+    pub(super) lamps_met: Vec<MetLamp>,
+
     // Light samples.
-    pub(super) lamps: RectangleLanes,
-    /// The lamp that each lane holds.
-    pub(super) lamp: [u32; LANES],
+    /// Paths that look for light.
+    pub(super) seeking: Vec<u32>,
+    pub(super) tree: TreeLanes,
+    /// The lights that were picked.
+    pub(super) picked: [u32; LANES],
+    pub(super) rectangles: RectangleLanes,
+    pub(super) spheres: SphereLanes,
+    /// The lamp that each lane of these holds.
+    pub(super) rectangle: [u32; LANES],
+    pub(super) sphere: [u32; LANES],
     pub(super) two_sided: [u32; LANES],
+    pub(super) sky: SkyLanes,
     pub(super) targets: TargetLanes,
     pub(super) is_delta: [u32; LANES],
     pub(super) arriving: [SampledSpectrum; LANES],
@@ -124,10 +148,13 @@ pub(crate) struct Batch {
     pub(super) light_cosine: Floats,
     pub(super) light_factor: Floats,
     /// Paths whose light samples are drawn alone, and their way to the sky.
-    pub(super) light_alone: Vec<(u32, PickedLight, Option<PixelLine>)>,
+    pub(super) light_alone: Vec<(u32, Option<PixelLine>)>,
     pub(super) light_runs: Vec<Option<PixelRun>>,
-    /// Where several lights are sampled, those of one path after those of another, each with its share of the strata.
-    pub(super) light_picks: Vec<(PickedLight, f32)>,
+    /// Where several lights are sampled: of each path so many places, with the number of strata that picked the light; how many are taken;
+    /// and a stratum's numbers.
+    pub(super) light_picks: Vec<(PickedLight, u32)>,
+    pub(super) light_counts: [u32; LANES],
+    pub(super) light_pick: Floats,
     pub(super) shadow_rays: Vec<Ray>,
     pub(super) shadow_ends: Vec<f32>,
     /// The sample that each would bring this to.
@@ -139,6 +166,8 @@ pub(crate) struct Batch {
     pub(super) next_pdf: Floats,
     /// cos / pdf; negative where nothing is scattered.
     pub(super) next_factor: Floats,
+    /// Where on the sky's image directions lead to.
+    pub(super) places: [Floats; 2],
 }
 
 const NO_LAMP: u32 = u32::MAX;
@@ -174,9 +203,16 @@ impl Batch {
             bsdfs: Vec::new(),
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
-            lamps: RectangleLanes::NONE,
-            lamp: [NO_LAMP; LANES],
+            lamps_met: Vec::new(),
+            seeking: Vec::new(),
+            tree: TreeLanes::NONE,
+            picked: [0; LANES],
+            rectangles: RectangleLanes::NONE,
+            spheres: SphereLanes::NONE,
+            rectangle: [NO_LAMP; LANES],
+            sphere: [NO_LAMP; LANES],
             two_sided: [0; LANES],
+            sky: SkyLanes::NONE,
             targets: TargetLanes::NONE,
             is_delta: [0; LANES],
             arriving: [SampledSpectrum::ZERO; LANES],
@@ -188,6 +224,8 @@ impl Batch {
             light_alone: Vec::new(),
             light_runs: Vec::new(),
             light_picks: Vec::new(),
+            light_counts: [0; LANES],
+            light_pick: [0.0; LANES],
             shadow_rays: Vec::new(),
             shadow_ends: Vec::new(),
             shadow_light: Vec::new(),
@@ -195,6 +233,7 @@ impl Batch {
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
             next_factor: [0.0; LANES],
+            places: [[0.0; LANES]; 2],
         })
     }
 
@@ -208,10 +247,17 @@ impl Batch {
             self.d.set(n, ray.d.to_array());
             self.time[n] = ray.time;
             self.streams.set(n, &sample.stream);
-            self.escape_place[n] = hits[s].map_or_else(|| scene.lights.place_of_escape(ray.d), |_| None);
             (self.throughput[n], self.roulette_scale[n]) = (SampledSpectrum::ONE, 1.0);
             (self.met[n], self.sample[n]) = (hits[s], s as u32);
             n += 1;
+        }
+        if let Some((_, sky)) = scene.lights.sky()
+            && self.met[..n].iter().any(Option::is_none)
+        {
+            scene.geometry.level().run(PlacesOfCamera(self, n, sky));
+            for i in 0..n {
+                self.escape_place[i] = self.met[i].map_or_else(|| Some(self.place(i, sky)), |_| None);
+            }
         }
         n
     }
@@ -219,6 +265,14 @@ impl Batch {
     #[inline(always)]
     pub fn ray(&self, i: usize) -> Ray {
         Ray::new(self.o.point(i), self.d.vector(i), self.time[i])
+    }
+
+    /// Where on the sky's image the direction of a lane leads to, whose memory is asked for.
+    #[inline]
+    pub fn place(&self, i: usize, sky: &ImageInfiniteLight) -> Point2 {
+        let place = Point2::new(self.places[0][i], self.places[1][i]);
+        sky.prefetch(place);
+        place
     }
 
     /// A path on its way to what it meets.
@@ -264,6 +318,17 @@ impl Batch {
         self.met[to] = self.met[from];
         self.escape_place[to] = self.escape_place[from];
         self.sample[to] = self.sample[from];
+    }
+
+    /// What a material is, if that is the same everywhere.
+    #[inline(always)]
+    pub(super) fn plain(&mut self, scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> Plain {
+        match self.known.get_mut(material.0 as usize) {
+            Some(known) if lambda.basis == Basis::Rgb => {
+                *known.get_or_insert_with(|| Plain::of(scene, material, lambda))
+            }
+            _ => Plain::of(scene, material, lambda),
+        }
     }
 
     /// The weight of a lane's light sample over its density, where scattering finds its direction with the density `pdf`.
@@ -334,14 +399,12 @@ impl Batch {
         }
     }
 
-    /// Whether light samples are of any use at a lane's vertex.
-    #[inline(always)]
-    pub fn scatters(&self, i: usize) -> bool {
-        match self.scattering[i] {
-            Scattering::Diffuse => !self.reflectance[i].is_black(),
-            Scattering::Metal => true,
-            Scattering::Alone(k) => self.bsdfs[k as usize].flags().is_non_specular(),
-            Scattering::Gone => false,
+    /// Draws directions in lanes, and the rays that go there.
+    pub fn scatter(&mut self, n: usize, scene: &Scene) {
+        let level = scene.geometry.level();
+        level.run(Scatter(self, n));
+        if let Some((_, sky)) = scene.lights.sky() {
+            level.run(PlacesOfBounces(self, n, sky));
         }
     }
 
@@ -414,7 +477,12 @@ impl Batch {
         (self.time[to], self.rays[to]) = (ray.time, ray);
         self.streams.shift(to, from);
         self.sample[to] = self.sample[from];
-        self.escape_place[to] = scene.lights.place_of_escape(turn.wi);
+        self.escape_place[to] = match self.scattering[from] {
+            Scattering::Alone(_) => scene.lights.place_of_escape(turn.wi),
+            Scattering::Diffuse | Scattering::Metal | Scattering::Gone => {
+                scene.lights.sky().map(|(_, sky)| self.place(from, sky))
+            }
+        };
     }
 }
 

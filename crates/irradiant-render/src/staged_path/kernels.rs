@@ -4,6 +4,7 @@ use super::batch::Batch;
 use irradiant_core::bxdf::conductor::mirror_lobe;
 use irradiant_core::bxdf::{Ggx, is_usable};
 use irradiant_core::geometry::Kernel;
+use irradiant_core::light::{ImageInfiniteLight, places_of_sky};
 use irradiant_math::lanes::{WHOLE, whole};
 use irradiant_math::warp::cosine_hemisphere;
 use irradiant_math::{Point3, Vec3, offset_ray_origin};
@@ -35,15 +36,64 @@ impl Kernel for Numbers<'_> {
 }
 
 /// Points of rectangular lamps.
-pub(super) struct SampleLamps<'a>(pub &'a mut Batch, pub usize);
+pub(super) struct SampleRectangles<'a>(pub &'a mut Batch, pub usize);
 
-impl Kernel for SampleLamps<'_> {
+impl Kernel for SampleRectangles<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
         let Self(b, n) = self;
         let [u, v, ..] = &b.light.0;
-        b.lamps.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+        b.rectangles.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+    }
+}
+
+/// Points of spherical lamps.
+pub(super) struct SampleSpheres<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for SampleSpheres<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        let [u, v, ..] = &b.light.0;
+        b.spheres.sample(n, &b.at, [u, v], &b.two_sided, &mut b.targets);
+    }
+}
+
+/// Directions to the points of the sky that were drawn.
+pub(super) struct SampleSky<'a>(pub &'a mut Batch, pub usize, pub &'a ImageInfiniteLight);
+
+impl Kernel for SampleSky<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n, sky) = self;
+        b.sky.directions(n, sky, &mut b.targets);
+    }
+}
+
+/// Where on the sky's image rays from the camera lead to.
+pub(super) struct PlacesOfCamera<'a>(pub &'a mut Batch, pub usize, pub &'a ImageInfiniteLight);
+
+impl Kernel for PlacesOfCamera<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n, sky) = self;
+        places_of_sky(sky, n, &b.d, &mut b.places);
+    }
+}
+
+/// The same of directions that are scattered to.
+pub(super) struct PlacesOfBounces<'a>(pub &'a mut Batch, pub usize, pub &'a ImageInfiniteLight);
+
+impl Kernel for PlacesOfBounces<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n, sky) = self;
+        places_of_sky(sky, n, &b.next_d, &mut b.places);
     }
 }
 

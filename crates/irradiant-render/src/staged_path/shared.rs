@@ -2,12 +2,12 @@
 //! and after them its paths go by the common stages.
 
 use super::batch::{Batch, Scattering, Surface};
-use super::kernels::{Numbers, Scatter, Surfaces, Weigh};
+use super::kernels::Numbers;
 use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, survival_probability};
-use crate::shared_path::blocks::{Blocks, FirstScattering, Kind};
-use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, Scattered, Second, gains, is_shared};
+use crate::shared_path::blocks::{Blocks, FirstScattering, Kind, Leaving};
+use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, Second, gains, is_shared};
 use irradiant_core::bxdf::Bxdf;
 use irradiant_core::geometry::Hit;
 use irradiant_core::scene::Scene;
@@ -62,17 +62,13 @@ impl PathIntegrator {
 
         // First vertices.
         let n = b.begin(scene, samples, hits);
-        let (n, n_flat) = self.arrive(b, n, 0, scene, samples, &mut blocks.own);
-        if n_flat > 0 {
-            level.run(Surfaces(b, n));
-        }
-        self.shade(b, n, 0, scene, samples, &mut blocks.own, stats);
+        let n = self.meet(b, n, 0, scene, samples, &mut blocks.own, stats);
         if self.is_at_limit(0) || n == 0 {
             return;
         }
         level.run(Numbers(b, n, 0));
-        self.light_samples(b, n, 0, scene, samples, &mut blocks.own, stats);
-        level.run(Scatter(b, n));
+        b.light_samples(n, 0, self.light_splits_at(0), scene, samples, &mut blocks.own, stats);
+        b.scatter(n, scene);
         for i in 0..n {
             let s = b.sample[i] as usize;
             blocks.kinds[s] = if b.gains(i) {
@@ -97,11 +93,7 @@ impl PathIntegrator {
         for (s, kind) in blocks.kinds.iter().enumerate() {
             blocks.rest[s] = if *kind == Kind::Apart { SampledSpectrum::ZERO } else { blocks.own[s] };
         }
-        let (n, n_flat) = self.arrive(b, n, 1, scene, samples, &mut blocks.rest);
-        if n_flat > 0 {
-            level.run(Surfaces(b, n));
-        }
-        self.shade(b, n, 1, scene, samples, &mut blocks.rest, stats);
+        let n = self.meet(b, n, 1, scene, samples, &mut blocks.rest, stats);
         for (s, kind) in blocks.kinds.iter().enumerate() {
             if *kind != Kind::Apart {
                 blocks.own[s] = std::mem::replace(&mut blocks.rest[s], SampledSpectrum::ZERO);
@@ -111,7 +103,7 @@ impl PathIntegrator {
             self.share_second(b, n, blocks);
             level.run(Numbers(b, n, 1));
             self.light_at_second(b, n, scene, samples, blocks, stats);
-            level.run(Scatter(b, n));
+            b.scatter(n, scene);
             for (s, kind) in blocks.kinds.iter().enumerate() {
                 if *kind != Kind::Apart {
                     blocks.direct[s] = std::mem::replace(&mut blocks.rest[s], SampledSpectrum::ZERO);
@@ -176,10 +168,11 @@ impl PathIntegrator {
                     Scattering::Alone(k) => b.bsdfs[k as usize].frame.z,
                     _ => b.at.z.vector(i),
                 };
-                Scattered::Evenly { normal: z * 1f32.copysign(wo.dot(z)), radiance: SampledSpectrum::ZERO }
+                Leaving::Evenly { normal: z * 1f32.copysign(wo.dot(z)), radiance: SampledSpectrum::ZERO }
             } else {
                 blocks.kinds[s] = Kind::By;
-                Scattered::By { bsdf: b.bsdf(i), incoming: 0..0 }
+                blocks.bsdfs.push(b.bsdf(i));
+                Leaving::By { bsdf: blocks.bsdfs.len() as u32 - 1, incoming: 0..0 }
             };
             blocks.seconds[s] = Some(Second { place: b.at.reference(i), wo, pdf: b.bsdf_pdf[i], carried, light });
         }
@@ -195,14 +188,10 @@ impl PathIntegrator {
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
-        let pick = |b: &Batch, i: usize| {
-            let picked = scene.light_sampler.sample(&b.at.reference(i), b.light.light_draws(i).pick)?;
-            Some((picked, picked.pmf, 1.0))
-        };
-        if !self.draw_lights(b, n, 1, scene, samples, &mut blocks.rest, stats, pick) {
+        b.pick_lights(n, scene);
+        if !b.sample_picked(n, 1, scene, samples, &mut blocks.rest, stats) {
             return;
         }
-        scene.geometry.level().run(Weigh(b, n));
         b.shadow_rays.clear();
         b.shadow_ends.clear();
         let begin = blocks.incoming.len();
@@ -238,7 +227,7 @@ impl PathIntegrator {
             }
         }
         blocks.incoming.truncate(stay);
-        self.arriving_light(b, n, scene, &mut blocks.rest, stats);
+        b.arriving_light(n, scene, &mut blocks.rest, stats);
     }
 
     /// Plays roulette at second vertices, traces the rays of paths that go on, and asks what those of lamps see that others see by BSDFs. How

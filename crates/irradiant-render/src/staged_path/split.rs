@@ -1,22 +1,19 @@
 //! Several light samples at a vertex, as [`split_light`](crate::light_samples) takes them: the first of all paths, then the second of all.
 
 use super::batch::Batch;
-use super::kernels::Weigh;
 use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
-use crate::light_samples::{PickedLights, all_are_sampled, samples_by_chance};
-use crate::path::PathIntegrator;
+use crate::light_samples::{all_are_sampled, samples_by_chance};
 use irradiant_core::interaction::LightId;
-use irradiant_core::light_sampler::PickedLight;
+use irradiant_core::light_sampler::{PickedLight, PointLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::LANES;
 use irradiant_spectrum::SampledSpectrum;
 
-impl PathIntegrator {
+impl Batch {
     /// Light samples of each path, the choice of the light split into `splits` strata, more than one.
     pub(super) fn split_light_samples(
-        &self,
-        b: &mut Batch,
+        &mut self,
         n: usize,
         depth: u32,
         splits: u32,
@@ -28,42 +25,77 @@ impl PathIntegrator {
         // A path's are added to each other first, since sums depend on the order.
         let mut sums = [SampledSpectrum::ZERO; LANES];
         let sums = &mut sums[..radiance.len()];
-        let level = scene.geometry.level();
-        let mut round = |b: &mut Batch, pick: &dyn Fn(usize) -> Option<(PickedLight, f32)>| {
-            let pick = |_: &Batch, i: usize| {
-                pick(i).map(|(picked, share)| (picked, samples_by_chance(picked.pmf, splits), share))
-            };
-            if self.draw_lights(b, n, depth, scene, samples, sums, stats, pick) {
-                level.run(Weigh(b, n));
-                self.arriving_light(b, n, scene, sums, stats);
-            }
-        };
+        self.seek_light(n);
         if all_are_sampled(scene, splits) {
-            for light in 0..scene.lights.len() {
-                let picked = PickedLight { id: LightId(light as u32), pmf: 1.0 };
-                round(b, &|_| Some((picked, 1.0)));
-            }
-        } else {
-            let mut picks = std::mem::take(&mut b.light_picks);
-            let mut begin = [0; LANES + 1];
-            picks.clear();
-            for i in 0..n {
-                begin[i] = picks.len();
-                if b.scatters(i) {
-                    let draws = b.light.light_draws(i);
-                    picks.extend(PickedLights::of(scene, &b.at.reference(i), &draws, splits).iter());
+            let seeking = std::mem::take(&mut self.seeking);
+            for light in 0..scene.lights.len() as u32 {
+                for &i in &seeking {
+                    self.pick(i as usize, PickedLight { id: LightId(light), pmf: 1.0 }, 1.0, splits);
+                }
+                if self.sample_picked(n, depth, scene, samples, sums, stats) {
+                    self.arriving_light(n, scene, sums, stats);
                 }
             }
-            begin[n] = picks.len();
-            let most = (0..n).map(|i| begin[i + 1] - begin[i]).max().unwrap_or(0);
+            self.seeking = seeking;
+        } else {
+            self.pick_split(n, splits, scene);
+            let most = self.light_counts[..n].iter().copied().max().unwrap_or(0);
             for k in 0..most {
-                round(b, &|i| picks[begin[i]..begin[i + 1]].get(k).copied());
+                for i in 0..n {
+                    self.pmf[i] = 0.0;
+                    if k < self.light_counts[i] {
+                        let (picked, times) = self.light_picks[i * splits as usize + k as usize];
+                        self.pick(i, picked, times as f32 / splits as f32, splits);
+                    }
+                }
+                if self.sample_picked(n, depth, scene, samples, sums, stats) {
+                    self.arriving_light(n, scene, sums, stats);
+                }
             }
-            b.light_picks = picks;
         }
         for i in 0..n {
-            let s = b.sample[i] as usize;
+            let s = self.sample[i] as usize;
             radiance[s] += sums[s];
+        }
+    }
+
+    /// Puts a light into a lane that stands for a share of the strata.
+    #[inline(always)]
+    fn pick(&mut self, i: usize, picked: PickedLight, share: f32, splits: u32) {
+        (self.picked[i], self.pmf[i]) = (picked.id.0, picked.pmf);
+        (self.light_times[i], self.light_share[i]) = (samples_by_chance(picked.pmf, splits), share);
+    }
+
+    /// The lights that the strata of each path that seeks light pick, as [`PickedLights`](crate::light_samples::PickedLights) has them.
+    fn pick_split(&mut self, n: usize, splits: u32, scene: &Scene) {
+        self.light_counts[..n].fill(0);
+        self.light_picks.clear();
+        self.light_picks.resize(n * splits as usize, (PickedLight { id: LightId(0), pmf: 0.0 }, 0));
+        let level = scene.geometry.level();
+        for stratum in 0..splits {
+            for i in 0..n {
+                self.light_pick[i] = self.light.light_draws(i).pick_in_stratum(stratum, splits);
+            }
+            let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
+            let (picked, pmf) = (&mut self.picked, &mut self.pmf);
+            scene.light_sampler.sample_lanes(level, &self.seeking, at, &self.light_pick, &mut self.tree, picked, pmf);
+            for &i in &self.seeking {
+                let i = i as usize;
+                if !(self.pmf[i] > 0.0) {
+                    continue;
+                }
+                let light = PickedLight { id: LightId(self.picked[i]), pmf: self.pmf[i] };
+                let picks = &mut self.light_picks[i * splits as usize..(i + 1) * splits as usize];
+                let count = self.light_counts[i] as usize;
+                // Most samplers pick a light in strata side by side.
+                match picks[..count].iter_mut().rev().find(|(known, _)| known.id == light.id) {
+                    Some((_, times)) => *times += 1,
+                    None => {
+                        picks[count] = (light, 1);
+                        self.light_counts[i] += 1;
+                    }
+                }
+            }
         }
     }
 }

@@ -11,12 +11,14 @@ mod bilinear;
 mod quadric;
 mod rectangle;
 mod rectangle_lanes;
+mod sphere_lanes;
 mod triangle;
 
 pub use bilinear::BilinearEmitter;
 pub use quadric::{CylinderEmitter, DiskEmitter, SphereEmitter};
 pub use rectangle::RectangleEmitter;
 pub use rectangle_lanes::RectangleLanes;
+pub use sphere_lanes::SphereLanes;
 pub use triangle::TriangleEmitter;
 
 use crate::interaction::ReferencePoint;

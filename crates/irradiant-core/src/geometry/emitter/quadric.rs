@@ -96,32 +96,94 @@ impl SphereEmitter {
         ShapeSample { p, p_error, n, uv, pdf: self.stretch.pdf_shape_normal(&s.placement, n_shape) }
     }
 
-    /// From `at` to the centre, squared distance and radius, if `at` is outside a whole sphere.
+    /// The ball it is, if it is whole and round.
     #[inline]
-    fn seen_from(&self, at: &ReferencePoint) -> Option<(Double3, f64, Double3, f64)> {
+    pub(super) fn ball(&self) -> Option<Ball> {
         let (center, radius) = self.ball?;
-        let to = sub(center, double(at.p.to_array()));
-        let d2 = dot(to, to);
-        // On the surface, rounding decides the side: samples by area do no harm there.
-        let reach = radius + at.p_error.max_component() as f64;
-        (d2 > reach * reach).then_some((to, d2, center, radius))
+        Some(Ball { center, radius, sign: if self.sphere.placement.flip { -1.0 } else { 1.0 } })
     }
 
     pub(super) fn sample(&self, at: &ReferencePoint, u: Point2, wants_uv: bool) -> Drawn {
-        let Some((to, d2, center, radius)) = self.seen_from(at) else { return Drawn::ByArea };
+        let Some(ball) = self.ball() else { return Drawn::ByArea };
+        let (seen, is_outside) = ball.seen_from(at.p, at.p_error);
+        if !is_outside {
+            return Drawn::ByArea;
+        }
+        let BallPoint { p, n, pdf, exact } = ball.sample(&seen, u);
+        let uv = if wants_uv { self.sphere.uv(self.sphere.placement.point_to_shape(exact)) } else { Point2::ZERO };
+        Drawn::BySolidAngle(ShapeSample { p, p_error: ball_error(exact), n, uv, pdf })
+    }
+
+    pub(super) fn pdf(&self, at: &ReferencePoint, wi: Vec3, p: Point3) -> Option<f32> {
+        let ball = self.ball()?;
+        let (seen, is_outside) = ball.seen_from(at.p, at.p_error);
+        is_outside.then(|| ball.pdf(&seen, wi, p))
+    }
+}
+
+/// A whole sphere in render space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    pub center: Double3,
+    pub radius: f64,
+    /// -1 where its outer side is within.
+    pub sign: f64,
+}
+
+/// How a ball is seen from a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SeenBall {
+    /// From the point to the centre, and the squared length of that.
+    to: Double3,
+    d2: f64,
+}
+
+/// A point of a ball by the cone that it subtends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BallPoint {
+    pub p: Point3,
+    pub n: Normal3,
+    /// Per steradian.
+    pub pdf: f32,
+    /// The point, not rounded.
+    pub exact: Double3,
+}
+
+/// Bound of the error of a ball's point.
+#[inline(always)]
+pub(super) fn ball_error(p: Double3) -> Vec3 {
+    axes(|i| p[i].abs() as f32 * gamma(2)).into()
+}
+
+impl Ball {
+    /// Seen from `p`, and whether that is outside, where alone it can be sampled by its cone.
+    #[inline(always)]
+    pub fn seen_from(&self, p: Point3, p_error: Vec3) -> (SeenBall, bool) {
+        let to = sub(self.center, double(p.to_array()));
+        let d2 = dot(to, to);
+        // On the surface, rounding decides the side: samples by area do no harm there.
+        let reach = self.radius + p_error.max_component() as f64;
+        (SeenBall { to, d2 }, d2 > reach * reach)
+    }
+
+    /// A point by `u`, uniform in the cone that the ball subtends.
+    #[inline(always)]
+    pub fn sample(&self, &SeenBall { to, d2 }: &SeenBall, u: Point2) -> BallPoint {
+        let Self { center, radius, sign } = *self;
         let inverse_distance = 1.0 / d2.sqrt();
         let sin_max = radius * inverse_distance;
         let sin2_max = sin_max * sin_max;
         let height = cone_height(sin2_max);
         let (u0, u1) = (u.x as f64, u.y);
         let one_minus_cos = height * u0;
-        let sin2 = if sin2_max < SMALL_SIN2 { sin2_max * u0 } else { one_minus_cos * (2.0 - one_minus_cos) };
+        let (small, large) = (sin2_max * u0, one_minus_cos * (2.0 - one_minus_cos));
+        let sin2 = if sin2_max < SMALL_SIN2 { small } else { large };
         let cos = (1.0 - sin2).max(0.0).sqrt();
         // Cosine of the angle at the centre between the directions to `at` and to the point.
         let share = sin2 / sin2_max;
         let cos_alpha = (share * sin_max + cos * (1.0 - share).max(0.0).sqrt()).min(1.0);
         let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = elementary::sin_cos(u1 * TAU);
+        let (sin_phi, cos_phi) = elementary::sin_cos_bounded(u1 * TAU);
         let axis = scale(to, -inverse_distance);
         let frame = Frame::from_z(single(axis).into());
         let (x, y) = (double(frame.x.to_array()), double(frame.y.to_array()));
@@ -129,31 +191,22 @@ impl SphereEmitter {
         // The frame is unit to a single's precision; one step of Newton's makes that a double's.
         let n = scale(n, 1.5 - 0.5 * dot(n, n));
         let p = axes(|i| center[i] + radius * n[i]);
-        let placement = &self.sphere.placement;
-        let error = axes(|i| p[i].abs() as f32 * gamma(2));
-        let sign = if placement.flip { -1.0 } else { 1.0 };
-        Drawn::BySolidAngle(ShapeSample {
-            p: single(p).into(),
-            p_error: error.into(),
-            n: single(scale(n, sign)).into(),
-            uv: if wants_uv { self.sphere.uv(placement.point_to_shape(p)) } else { Point2::ZERO },
-            pdf: (1.0 / height) as f32 / TAU,
-        })
+        BallPoint { p: single(p).into(), n: single(scale(n, sign)).into(), pdf: (1.0 / height) as f32 / TAU, exact: p }
     }
 
-    pub(super) fn pdf(&self, at: &ReferencePoint, wi: Vec3, p: Point3) -> Option<f32> {
-        let (_, d2, center, radius) = self.seen_from(at)?;
+    /// Density, per steradian, with which [`Ball::sample`] draws the direction `wi` by way of its point `p`.
+    #[inline(always)]
+    pub fn pdf(&self, seen: &SeenBall, wi: Vec3, p: Point3) -> f32 {
         // The far side (met by rays that pass the near one, if that is cut out by alpha) is never drawn.
-        let outwards = sub(double(p.to_array()), center);
-        if dot(outwards, double(wi.to_array())) > 1e-3 * radius {
-            return Some(0.0);
-        }
-        Some((1.0 / cone_height(radius * radius / d2)) as f32 / TAU)
+        let outwards = sub(double(p.to_array()), self.center);
+        let is_far = dot(outwards, double(wi.to_array())) > 1e-3 * self.radius;
+        let pdf = (1.0 / cone_height(self.radius * self.radius / seen.d2)) as f32 / TAU;
+        if is_far { 0.0 } else { pdf }
     }
 }
 
 /// 1 - cos of a cone's half angle from its sin^2.
-#[inline]
+#[inline(always)]
 fn cone_height(sin2: f64) -> f64 {
     // Without the cancellation of 1 - sqrt(1 - x).
     sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())

@@ -1,0 +1,328 @@
+//! Light of lamps: those that paths meet, and those that are sampled at vertices.
+
+use super::batch::{Batch, MetLamp, Scattering};
+use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
+use crate::camera_samples::CameraSample;
+use crate::integrator::RenderStats;
+use crate::light_samples::{all_are_sampled, direct_light, samples_by_chance, strata};
+use crate::path::power_heuristic;
+use crate::record::NoRecord;
+use irradiant_core::bxdf::TransportMode;
+use irradiant_core::geometry::EmitterShape;
+use irradiant_core::interaction::LightId;
+use irradiant_core::light::{AreaAlpha, AreaRadiance, Light, LightHit, SampleMode};
+use irradiant_core::light_sampler::{LightSampler, PointLanes};
+use irradiant_core::scene::Scene;
+use irradiant_math::Point2;
+use irradiant_math::lanes::LANES;
+use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use std::f32::consts::FRAC_1_PI;
+
+/// All of [`Compensated`](SampleMode::Compensated): hits are weighed against samples.
+const MODE: SampleMode = SampleMode::Compensated;
+
+impl Batch {
+    /// A path meets a lamp: what that emits is still to be weighed.
+    #[inline]
+    pub fn meet_lamp(&mut self, i: usize, scene: &Scene, light: LightId, uv: Point2, lambda: &Wavelengths) {
+        let emitted = scene.lights.get(light).emitted(self.at.n.normal(i), uv, self.at.wo.vector(i), lambda);
+        if !emitted.is_black() {
+            self.lamps_met.push(MetLamp { lane: i as u32, light, uv, emitted });
+        }
+    }
+
+    /// The light of the lamps that paths meet, weighed against having sampled it.
+    pub fn light_of_lamps(&mut self, depth: u32, scene: &Scene, radiance: &mut [SampledSpectrum]) {
+        // Whose weight is asked for: not what the camera sees, by itself or in mirrors, nor where all lights are sampled.
+        self.seeking.clear();
+        let all_are_sampled = all_are_sampled(scene, self.light_splits);
+        for met in self.lamps_met.iter().filter(|met| depth > 0 && !self.specular[met.lane as usize]) {
+            (self.picked[met.lane as usize], self.pmf[met.lane as usize]) = (met.light.0, 1.0);
+            if !all_are_sampled {
+                self.seeking.push(met.lane);
+            }
+        }
+        let [p, p_error, n, ns] = &self.previous;
+        let from = PointLanes { p, p_error, n, ns };
+        if !self.seeking.is_empty() {
+            let level = scene.geometry.level();
+            let (picked, tree, pmf) = (&self.picked, &mut self.tree, &mut self.pmf);
+            scene.light_sampler.pmf_lanes(level, &self.seeking, from, picked, tree, pmf);
+        }
+        for met in &self.lamps_met {
+            let i = met.lane as usize;
+            let (mut light_pdf, mut bsdf_pdf) = (0.0, 0.0);
+            if depth > 0 {
+                bsdf_pdf = self.bsdf_pdf[i];
+                if !self.specular[i] {
+                    let hit = LightHit { p: self.at.p.point(i), n: self.at.n.normal(i), uv: met.uv };
+                    let pdf = scene.lights.get(met.light).pdf_hit(&from.reference(i), self.d.vector(i), &hit);
+                    light_pdf = samples_by_chance(self.pmf[i], self.light_splits) * pdf;
+                }
+            }
+            let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
+            radiance[self.sample[i] as usize] += self.throughput[i] * met.emitted * weight;
+        }
+    }
+
+    /// A light sample of each path, or several where the choice of the light is split into `splits` strata.
+    pub fn light_samples(
+        &mut self,
+        n: usize,
+        depth: u32,
+        splits: u32,
+        scene: &Scene,
+        samples: &[CameraSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) {
+        if strata(scene, splits) > 1 {
+            self.split_light_samples(n, depth, splits, scene, samples, radiance, stats);
+            return;
+        }
+        self.pick_lights(n, scene);
+        if self.sample_picked(n, depth, scene, samples, radiance, stats) {
+            self.arriving_light(n, scene, radiance, stats);
+        }
+    }
+
+    /// Points of the lights that have been picked, and how they are weighed. Whether there are any.
+    pub(super) fn sample_picked(
+        &mut self,
+        n: usize,
+        depth: u32,
+        scene: &Scene,
+        samples: &[CameraSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) -> bool {
+        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(n, depth, scene, samples, radiance, stats);
+        if any {
+            scene.geometry.level().run(Weigh(self, n));
+        }
+        any
+    }
+
+    /// A light of each path whose surface scatters light that it is not known where to look for.
+    pub(super) fn pick_lights(&mut self, n: usize, scene: &Scene) {
+        self.seek_light(n);
+        match &scene.light_sampler {
+            LightSampler::Uniform(_) if scene.lights.len() == 1 => {
+                for &i in &self.seeking {
+                    (self.picked[i as usize], self.pmf[i as usize]) = (0, 1.0);
+                }
+            }
+            sampler => {
+                let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
+                let [_, _, pick, _] = &self.light.0;
+                let (level, tree) = (scene.geometry.level(), &mut self.tree);
+                sampler.sample_lanes(level, &self.seeking, at, pick, tree, &mut self.picked, &mut self.pmf);
+            }
+        }
+        self.light_times = self.pmf;
+        self.light_share = [1.0; LANES];
+    }
+
+    /// Paths whose surfaces scatter light that it is not known where to look for; no light is picked yet.
+    pub(super) fn seek_light(&mut self, n: usize) {
+        self.seeking.clear();
+        for i in 0..n {
+            self.pmf[i] = 0.0;
+            let scatters = match self.scattering[i] {
+                Scattering::Diffuse => !self.reflectance[i].is_black(),
+                Scattering::Metal => true,
+                Scattering::Alone(k) => self.bsdfs[k as usize].flags().is_non_specular(),
+                Scattering::Gone => false,
+            };
+            if scatters {
+                self.seeking.push(i as u32);
+            }
+        }
+    }
+
+    /// Points of those lamps that have lanes; the others are put down to be asked alone. Whether there are any.
+    fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[CameraSample]) -> bool {
+        let sky = scene.lights.sky();
+        self.light_alone.clear();
+        let (mut any_rectangle, mut any_sphere) = (false, false);
+        for i in 0..n {
+            self.spheres.forget(i);
+            self.sky.forget(i);
+            if !(self.pmf[i] > 0.0) {
+                continue;
+            }
+            let id = LightId(self.picked[i]);
+            if let Light::Area(lamp) = scene.lights.get(id)
+                && let (AreaRadiance::Uniform(emission), AreaAlpha::Constant(alpha)) = (&lamp.radiance, lamp.alpha)
+            {
+                let has_lanes = match &lamp.shape {
+                    EmitterShape::Rectangle(rectangle) => {
+                        if self.rectangle[i] != id.0 {
+                            self.rectangles.set(i, rectangle);
+                            self.rectangle[i] = id.0;
+                        }
+                        any_rectangle = true;
+                        true
+                    }
+                    EmitterShape::Sphere(sphere) => {
+                        let is_ball = self.sphere[i] == id.0 || self.spheres.set(i, sphere);
+                        if is_ball {
+                            self.sphere[i] = id.0;
+                            self.spheres.ask(i);
+                            any_sphere = true;
+                        }
+                        is_ball
+                    }
+                    EmitterShape::Triangle(_)
+                    | EmitterShape::Bilinear(_)
+                    | EmitterShape::Disk(_)
+                    | EmitterShape::Cylinder(_)
+                    | EmitterShape::Curve(_) => false,
+                };
+                if has_lanes {
+                    self.arriving[i] = emission.sample(&samples[self.sample[i] as usize].lambda) * lamp.scale * alpha;
+                    (self.is_delta[i], self.two_sided[i]) = (0, u32::from(lamp.two_sided));
+                    continue;
+                }
+            }
+            let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(self.light.uv(i), MODE));
+            self.light_alone.push((i as u32, line));
+        }
+        let level = scene.geometry.level();
+        if any_rectangle {
+            level.run(SampleRectangles(self, n));
+        }
+        if any_sphere {
+            level.run(SampleSpheres(self, n));
+            let within = (0..n as u32).filter(|&i| self.spheres.is_left(i as usize)).map(|i| (i, None));
+            self.light_alone.extend(within);
+        }
+        any_rectangle | any_sphere
+    }
+
+    /// Light samples that are asked alone. Whether there are any.
+    fn sample_alone(
+        &mut self,
+        n: usize,
+        depth: u32,
+        scene: &Scene,
+        samples: &[CameraSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) -> bool {
+        let sky = scene.lights.sky();
+        // The way to a point of the sky is waiting for memory: each step for all.
+        self.light_runs.clear();
+        self.light_runs.extend(
+            self.light_alone.iter().map(|&(_, line)| line.zip(sky).map(|(line, (_, sky))| sky.approach(line, MODE))),
+        );
+        let may_pass = scene.materials.may_pass();
+        let (mut any, mut any_sky) = (false, false);
+        for j in 0..self.light_alone.len() {
+            let ((i, _), run) = (self.light_alone[j], self.light_runs[j]);
+            let i = i as usize;
+            let s = self.sample[i] as usize;
+            let lambda = &samples[s].lambda;
+            let light = scene.lights.get(LightId(self.picked[i]));
+            if let (Some(run), Some((_, sky))) = (run, sky) {
+                if let Some(radiance) = self.sky.arrive(i, sky, run, lambda, MODE) {
+                    (self.arriving[i], self.is_delta[i]) = (radiance, 0);
+                    any_sky = true;
+                } else {
+                    self.pmf[i] = 0.0;
+                }
+                continue;
+            }
+            let sample = if may_pass && light.is_delta() {
+                radiance[s] += self.light_alone(i, depth, scene, lambda, stats);
+                None
+            } else {
+                light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE)
+            };
+            let Some(sample) = sample else {
+                self.pmf[i] = 0.0;
+                continue;
+            };
+            self.arriving[i] = sample.radiance * scene.opacity(&sample);
+            self.targets.set(i, &sample);
+            self.is_delta[i] = u32::from(sample.is_delta);
+            any = true;
+        }
+        if let (true, Some((_, sky))) = (any_sky, sky) {
+            scene.geometry.level().run(SampleSky(self, n, sky));
+        }
+        any | any_sky
+    }
+
+    /// A light sample of one path.
+    #[cold]
+    fn light_alone(
+        &self,
+        i: usize,
+        depth: u32,
+        scene: &Scene,
+        lambda: &Wavelengths,
+        stats: &mut RenderStats,
+    ) -> SampledSpectrum {
+        direct_light(
+            scene,
+            &self.interaction(i),
+            &self.bsdf(i),
+            &self.throughput[i],
+            lambda,
+            &self.light.light_draws(i),
+            None,
+            1,
+            depth,
+            stats,
+            &mut NoRecord,
+        )
+    }
+
+    /// What light samples bring, unless something is in the way.
+    pub(super) fn arriving_light(
+        &mut self,
+        n: usize,
+        scene: &Scene,
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) {
+        self.shadow_rays.clear();
+        self.shadow_ends.clear();
+        self.shadow_light.clear();
+        for i in 0..n {
+            // Not a comparison that NaN fails: what is wrong must reach the film, which counts it.
+            if self.pmf[i] == 0.0 || self.targets.pdf[i] == 0.0 {
+                continue;
+            }
+            let (f, factor) = match self.scattering[i] {
+                Scattering::Diffuse => (self.reflectance[i] * FRAC_1_PI, self.light_factor[i]),
+                Scattering::Metal => (self.metal_f(i), self.light_factor[i]),
+                Scattering::Alone(k) => {
+                    let (bsdf, wi) = (&self.bsdfs[k as usize], self.targets.wi.vector(i));
+                    let (f, pdf) = bsdf.f_and_pdf(self.at.wo.vector(i), wi, TransportMode::Radiance);
+                    self.light_cosine[i] = wi.dot(bsdf.frame.z).abs();
+                    (f, self.light_weight(i, pdf))
+                }
+                Scattering::Gone => continue,
+            };
+            let f = f * self.light_cosine[i];
+            if f.is_black() || self.arriving[i].is_black() || !f.is_finite() {
+                continue;
+            }
+            let (ray, end) = self.targets.ray(i, self.time[i]);
+            self.shadow_rays.push(ray);
+            self.shadow_ends.push(end);
+            self.shadow_light.push((self.sample[i], self.throughput[i] * f * self.arriving[i] * factor));
+        }
+        stats.shadow_rays += self.shadow_rays.len() as u64;
+        let mut occluded = [false; LANES];
+        let occluded = &mut occluded[..self.shadow_rays.len()];
+        scene.geometry.occluded_batch(&self.shadow_rays, &self.shadow_ends, &scene.alpha(), occluded);
+        for (&(s, light), occluded) in self.shadow_light.iter().zip(occluded) {
+            if !*occluded {
+                radiance[s as usize] += light;
+            }
+        }
+    }
+}
