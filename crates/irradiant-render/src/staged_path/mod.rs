@@ -32,6 +32,7 @@ use irradiant_core::interaction::Interaction;
 use irradiant_core::sampler::{SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
+use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 use kernels::{Numbers, Surfaces};
 
@@ -269,7 +270,24 @@ impl PathIntegrator {
             stay += 1;
         }
         b.light_splits = self.light_splits_at(depth - 1);
+        // Where no surface shines, all that matters at the end of the longest paths is whether they leave the scene.
+        if self.is_at_limit(depth) && scene.geometry.emitters().is_empty() && !scene.materials.may_pass() {
+            return those_that_escape(b, stay, scene);
+        }
         scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
         stay
     }
+}
+
+/// Ends the paths whose rays meet anything. How many leave the scene.
+fn those_that_escape(b: &mut Batch, n: usize, scene: &Scene) -> usize {
+    let (ends, mut blocked) = ([f32::INFINITY; LANES], [false; LANES]);
+    scene.geometry.occluded_batch(&b.rays[..n], &ends[..n], &scene.alpha(), &mut blocked[..n]);
+    let mut escaping = 0;
+    for i in (0..n).filter(|&i| !blocked[i]) {
+        b.shift(escaping, i);
+        b.met[escaping] = None;
+        escaping += 1;
+    }
+    escaping
 }
