@@ -183,11 +183,26 @@ fn under_an_image_of_the_sky() {
         let text = format!("{HEAD}{sky}{ROOM}{}{smooth}", plate(0.2));
         let integrator = PathIntegrator { max_depth: Some(depth), ..PathIntegrator::default() };
         assert_same_by(&integrator, &text);
+        let prism = "Material \"dielectric\" \"spectrum eta\" [ 400 2.6 700 1.1 ]\nTranslate -0.7 0 0\nShape \"sphere\" \"float radius\" 0.3\n";
+        assert_same_by(&integrator, &format!("{text}{prism}"));
         // An opening, and a mix whose other half is none.
         let holes = "MakeNamedMaterial \"wall\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"none\" \"string type\" \"interface\"\nMaterial \"mix\" \"string materials\" [ \"wall\" \"none\" ] \"float amount\" 0.5\nShape \"sphere\" \"float radius\" 0.4 \"float zmax\" 0.2\n";
         assert_same_by(&integrator, &format!("{text}{holes}"));
     }
+    // All that the camera sees lies behind a surface that may not be there: what a path knows of the sky is not a former path's.
+    let veil = "MakeNamedMaterial \"veil\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"none\" \"string type\" \"interface\"\nAttributeBegin\nMaterial \"mix\" \"string materials\" [ \"veil\" \"none\" ] \"float amount\" 0.5\nTranslate 0 1 0\nShape \"sphere\" \"float radius\" 6\nAttributeEnd\n";
+    assert_same(&format!("{HEAD}{sky}{veil}{ROOM}"));
     std::fs::remove_file(&file).expect("removed");
+}
+
+#[test]
+fn a_sky_and_nothing_else() {
+    let file =
+        load_text("scene", &format!("{HEAD}LightSource \"infinite\" \"rgb L\" [ .5 .6 .7 ]\n"), ".").expect("a scene");
+    let job = Job::new(&file, &RenderSettings::default()).expect("a job");
+    let integrator = PathIntegrator::default();
+    let (alone, batches) = (picture(&job, &integrator, false), picture(&job, &integrator, true));
+    assert!(alone == batches && alone.1.camera_rays > 1000);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Batches against the same rays one by one, at every level. Exact: false alarms are impossible.
 //!
 //! Seen to fail when broken: the entry bound from one end of the interval of reciprocals only; the far end of the packet
-//! taken from one ray; rays of different fastest axes sheared alike; what the fused form loses not allowed for.
+//! taken from one ray; rays of different fastest axes sheared alike; what the fused form loses not allowed for. In crowds: the entry a hundredth too far; ties
+//! to the higher index; the own box without its padding; hits of some lanes forgotten.
 
 use super::tests::{Balls, Random, Soup, ball, lattice_soup, random_soup, ray_at};
 use super::*;
@@ -180,7 +181,7 @@ fn anywhere(soup: &Soup, n: usize, random: &mut Random) -> Vec<Ray> {
 #[test]
 fn empty_trees_answer_batches_too() {
     let bvh = Bvh::build(&BuildInput::default(), &BuildSettings::default());
-    let ray = Ray { o: [0.0; 3], t_max: f32::INFINITY, d: [0.0, 0.0, 1.0], time: 0.0 };
+    let ray = Ray { o: [0.0; 3], t_max: f32::INFINITY, d: [0.2, 0.1, 1.0], time: 0.0 };
     for level in Level::available() {
         let (mut closest, mut any) = ([Some(Closest::User { t: 1.0, user: 0, hit: () }); 20], [true; 20]);
         bvh.intersect_batch(level, &[ray; 20], &TrianglesOnly, &mut closest);

@@ -201,7 +201,8 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     while n > 0 {
         n -= 1;
         let Entry { near, child } = stack.get(n);
-        let far = E::load(&best.t.0) * padding;
+        // Finite, or those that did not enter would pass while they have met nothing.
+        let far = (E::load(&best.t.0) * padding).min(E::splat(f32::MAX));
         let active = E::load(&near.0).le(far).mask();
         if active == 0 {
             continue;

@@ -106,6 +106,12 @@ impl Scene {
         SceneAlpha(&self.textures)
     }
 
+    /// In what light is counted, the same for all paths.
+    #[inline]
+    pub fn basis(&self) -> Basis {
+        self.basis
+    }
+
     /// Wavelengths of a path.
     #[inline]
     pub fn sample_wavelengths(&self, u: f32) -> Wavelengths {

@@ -251,6 +251,7 @@ impl Batch {
             (self.met[n], self.sample[n]) = (hits[s], s as u32);
             n += 1;
         }
+        self.escape_place[..n].fill(None);
         if let Some((_, sky)) = scene.lights.sky()
             && self.met[..n].iter().any(Option::is_none)
         {

@@ -33,7 +33,7 @@ use irradiant_core::sampler::{SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
 use irradiant_math::lanes::LANES;
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 use kernels::{Numbers, Surfaces};
 
 impl PathIntegrator {
@@ -270,13 +270,18 @@ impl PathIntegrator {
             stay += 1;
         }
         b.light_splits = self.light_splits_at(depth - 1);
-        // Where no surface shines, all that matters at the end of the longest paths is whether they leave the scene.
-        if self.is_at_limit(depth) && scene.geometry.emitters().is_empty() && !scene.materials.may_pass() {
+        if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, stay, scene);
         }
         scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
         stay
     }
+}
+
+/// Whether all that matters at the end of the longest paths is whether they leave the scene: no surface shines or lets them pass, or ends
+/// wavelengths by dispersion, for which the path's other light is counted differently.
+fn only_the_sky_counts(scene: &Scene) -> bool {
+    scene.geometry.emitters().is_empty() && !scene.materials.may_pass() && scene.basis() == Basis::Rgb
 }
 
 /// Ends the paths whose rays meet anything. How many leave the scene.
