@@ -32,7 +32,7 @@ pub struct TreeLanes {
 
 const NOWHERE: u32 = u32::MAX;
 
-/// Points that lights shine on, side by side: where, and with which shading normals (zero for none).
+/// Points that lights shine on, side by side, as [`ReferencePoint`](crate::interaction::ReferencePoint) has them (normals are zero where there are none).
 #[derive(Clone, Copy, Debug)]
 pub struct PointLanes<'a> {
     /// Where.

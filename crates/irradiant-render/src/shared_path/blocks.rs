@@ -169,6 +169,7 @@ impl Receivers {
         set_spectrum(&mut self.k, i, k);
     }
 }
+
 /// Light that leaves a second vertex, as [`Scattered`](super::Scattered).
 pub(crate) enum Leaving {
     /// The same radiance in all directions of the side of this normal.

@@ -234,7 +234,7 @@ impl Batch {
                 continue;
             }
             let sample = if may_pass && light.is_delta() {
-                radiance[s] += self.light_alone(i, depth, scene, lambda, stats);
+                radiance[s] += self.light_through_mixes(i, depth, scene, lambda, stats);
                 None
             } else {
                 light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE)
@@ -256,7 +256,7 @@ impl Batch {
 
     /// A light sample of one path.
     #[cold]
-    fn light_alone(
+    fn light_through_mixes(
         &self,
         i: usize,
         depth: u32,
