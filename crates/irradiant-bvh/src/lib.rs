@@ -16,7 +16,7 @@
 //! - `node`: the tree in memory; `validate`: its invariants.
 //! - `triangle`: the watertight test, scalar and eight at a time.
 //! - `traverse`: the walk, once for closest hits and once for any hit, for one ray, for packets of sixteen that travel together, and for crowds of
-//!   sixteen that go anywhere, in small trees.
+//!   sixteen that go anywhere.
 //! - `lanes`: four floats, or eight; `prefetch`: asking for memory early; `pages`: large arrays.
 //!
 //! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);

@@ -105,18 +105,23 @@ impl Bvh {
         in_company(self.sorts_rays(level), rays, out, packet, crowd, single);
     }
 
-    /// Whether rays that go anywhere are faster in one call than one by one: in a small tree, which sorts them by where they go, some 256
-    /// at a time (measured on x86 only).
+    /// Whether rays that go anywhere are faster in one call than one by one (measured on x86 only): in a small tree, and where a ray is expected to meet few nodes.
+    /// They are then sorted by where they go, some 256 at a time.
     pub fn sorts_rays(&self, level: Level) -> bool {
-        level != Level::Scalar && (1..=SMALL).contains(&self.nodes.len())
+        let is_small = self.nodes.len() <= SMALL || self.report.sah_cost <= SHALLOW;
+        level != Level::Scalar && !self.nodes.is_empty() && is_small
     }
 }
 
-/// Nodes of a tree at most in which rays go in crowds.
+/// Nodes of a tree at most in which rays go in crowds, whatever its cost.
 ///
-/// Rendering with crowds against without (paths, AVX-512, two Zen 4 cores, CPU time): 1 node 0.86 to 0.90, 2 nodes 0.93, a floor and two spheres 0.92; 136 nodes 1.03,
-/// 910 nodes 0.94, 32,400 nodes 1.06; real scenes of many nodes 0.99 to 1.10. With AVX2 0.92, 0.93; with SSE 0.70, 0.95.
+/// Rendering with crowds against without (paths, AVX-512, two Zen 4 cores, CPU time by turns): 1 node 0.86 to 0.90, 2 nodes 0.93, a floor and two spheres 0.92. With
+/// AVX2 0.92, 0.93; with SSE 0.70, 0.95.
 const SMALL: usize = 8;
+/// Expected cost of a ray at most in larger trees.
+///
+/// In the same way, by expected cost: 1.6 0.98, 0.97 and 1.00 (a million triangles), 2.9 0.98, 3.2 0.99, 3.3 0.94, 3.5 0.99, 4.1 1.06, 6.0 0.97, 7.4 1.03.
+const SHALLOW: f64 = 4.0;
 /// Rays of a batch that are sorted together.
 const SORTED: usize = 256;
 /// Crowds of fewer rays are not worth it.
