@@ -657,6 +657,9 @@ mod tests {
     #[inline(always)]
     fn run<F: Lanes>(x: F::Array, y: F::Array) -> Vec<F::Array> {
         let (a, b) = (F::load(&x), F::load(&y));
+        let mut rows = x;
+        (0..F::ALL.count_ones()).for_each(|i| rows[i as usize] = f32::from_bits((i % 3) << 3));
+        let table = [1.0, 2.0, 3.0].map(|row: f32| std::array::from_fn(|column| 10.0 * row + column as f32));
         let results = [
             a + b,
             a - b,
@@ -676,6 +679,8 @@ mod tests {
             F::splat(2.0).multiply_add(F::splat(3.0), F::splat(0.5)),
             F::select(a.lt(b).mask(), a, b),
             F::select(0x5a37 & F::ALL, a, b),
+            F::look_up(&table, F::load(&rows), 0),
+            F::look_up(&table, F::load(&rows), 7),
         ];
         results.iter().map(|r| r.to_array()).collect()
     }

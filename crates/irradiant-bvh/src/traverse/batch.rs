@@ -4,7 +4,7 @@
 use super::boxes;
 use super::boxes::Halves;
 use super::crowd;
-use super::packet::{self, PACKET};
+use super::packet::PACKET;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::Sse;
 use crate::lanes::{Pair, Portable, Twice};
@@ -12,11 +12,26 @@ use crate::level::Level;
 use crate::node::Bvh;
 use crate::ray::{Closest, Leaves, Ray};
 
+/// Calls a kernel for several rays, compiled for a level.
+macro_rules! at_level {
+    ($level:expr, $kernel:path, $avx2:path, $avx512:path, ($($argument:expr),*)) => {
+        match $level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => $avx512($($argument),*),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => $avx2($($argument),*),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => { use $kernel as kernel; kernel::<Pair<Twice<Sse>>, Halves<Sse>, L>($($argument),*) }
+            _ => { use $kernel as kernel; kernel::<Pair<Twice<Portable>>, Halves<Portable>, L>($($argument),*) }
+        }
+    };
+}
+
 impl Bvh {
     /// For each ray what [`intersect`](Self::intersect) gives, to the bit; `out[i]` is the answer for `rays[i]`.
     ///
-    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together, or the tree is small and
-    /// there are many.
+    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together, or the tree
+    /// [sorts](Self::sorts_rays) them and there are many.
     ///
     /// # Panics
     /// If `rays` and `out` differ in length.
@@ -29,34 +44,24 @@ impl Bvh {
     ) {
         assert_eq!(rays.len(), out.len(), "one answer for each ray");
         let level = level.min(Level::detect());
-        let packet = |rays: &[Ray], out: &mut [Option<Closest<L::UserHit>>]| match level {
-            Level::Scalar => false,
-            Level::Neon => packet::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Sse => packet::closest::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::closest_packet_avx2(self, rays, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => boxes::x86::closest_packet_avx512(self, rays, leaves, out),
-            #[cfg(not(target_arch = "x86_64"))]
-            Level::Sse | Level::Avx2 | Level::Avx512 => {
-                packet::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out)
-            }
+        let packet = |rays: &[Ray], out: &mut [Option<Closest<L::UserHit>>]| {
+            level != Level::Scalar
+                && at_level!(
+                    level,
+                    super::packet::closest,
+                    boxes::x86::closest_packet_avx2,
+                    boxes::x86::closest_packet_avx512,
+                    (self, rays, leaves, out)
+                )
         };
-        let crowd = |rays: &[Ray], which: &[u16], octant: usize, out: &mut [Option<Closest<L::UserHit>>]| match level {
-            Level::Neon | Level::Scalar => {
-                crowd::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
-            }
-            #[cfg(target_arch = "x86_64")]
-            Level::Sse => crowd::closest::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, which, octant, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::closest_crowd_avx2(self, rays, which, octant, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => boxes::x86::closest_crowd_avx512(self, rays, which, octant, leaves, out),
-            #[cfg(not(target_arch = "x86_64"))]
-            Level::Sse | Level::Avx2 | Level::Avx512 => {
-                crowd::closest::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
-            }
+        let crowd = |rays: &[Ray], which: &[u16], octant: usize, out: &mut [Option<Closest<L::UserHit>>]| {
+            at_level!(
+                level,
+                super::crowd::closest,
+                boxes::x86::closest_crowd_avx2,
+                boxes::x86::closest_crowd_avx512,
+                (self, rays, which, octant, leaves, out)
+            );
         };
         let single = |ray: &Ray| self.intersect(level, ray, leaves);
         in_company(self.sorts_rays(level), rays, out, packet, crowd, single);
@@ -64,42 +69,32 @@ impl Bvh {
 
     /// For each ray what [`occluded`](Self::occluded) says; `out[i]` is the answer for `rays[i]`.
     ///
-    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together, or the tree is small and
-    /// there are many.
+    /// Any number of rays in any order; fastest where each sixteen, and each eight, of `rays` travel together, or the tree
+    /// [sorts](Self::sorts_rays) them and there are many.
     ///
     /// # Panics
     /// If `rays` and `out` differ in length.
     pub fn occluded_batch<L: Leaves>(&self, level: Level, rays: &[Ray], leaves: &L, out: &mut [bool]) {
         assert_eq!(rays.len(), out.len(), "one answer for each ray");
         let level = level.min(Level::detect());
-        let packet = |rays: &[Ray], out: &mut [bool]| match level {
-            Level::Scalar => false,
-            Level::Neon => packet::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Sse => packet::any::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::any_packet_avx2(self, rays, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => boxes::x86::any_packet_avx512(self, rays, leaves, out),
-            #[cfg(not(target_arch = "x86_64"))]
-            Level::Sse | Level::Avx2 | Level::Avx512 => {
-                packet::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, leaves, out)
-            }
+        let packet = |rays: &[Ray], out: &mut [bool]| {
+            level != Level::Scalar
+                && at_level!(
+                    level,
+                    super::packet::any,
+                    boxes::x86::any_packet_avx2,
+                    boxes::x86::any_packet_avx512,
+                    (self, rays, leaves, out)
+                )
         };
-        let crowd = |rays: &[Ray], which: &[u16], octant: usize, out: &mut [bool]| match level {
-            Level::Neon | Level::Scalar => {
-                crowd::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
-            }
-            #[cfg(target_arch = "x86_64")]
-            Level::Sse => crowd::any::<Pair<Twice<Sse>>, Halves<Sse>, L>(self, rays, which, octant, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::any_crowd_avx2(self, rays, which, octant, leaves, out),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => boxes::x86::any_crowd_avx512(self, rays, which, octant, leaves, out),
-            #[cfg(not(target_arch = "x86_64"))]
-            Level::Sse | Level::Avx2 | Level::Avx512 => {
-                crowd::any::<Pair<Twice<Portable>>, Halves<Portable>, L>(self, rays, which, octant, leaves, out);
-            }
+        let crowd = |rays: &[Ray], which: &[u16], octant: usize, out: &mut [bool]| {
+            at_level!(
+                level,
+                super::crowd::any,
+                boxes::x86::any_crowd_avx2,
+                boxes::x86::any_crowd_avx512,
+                (self, rays, which, octant, leaves, out)
+            );
         };
         let single = |ray: &Ray| self.occluded(level, ray, leaves);
         in_company(self.sorts_rays(level), rays, out, packet, crowd, single);

@@ -5,12 +5,12 @@
 //! few rays remain they go on alone.
 
 use super::boxes::{BoxTest, FUSED_LIMIT, FUSED_LOST};
-use super::packet::{Column, PACKET, each, gathered};
-use super::side_by_side::{Bests, Lines};
+use super::packet::{Column, PACKET, each};
+use super::side_by_side::{Bests, Lines, stopped_by_users};
 use super::walk::{self, Stack};
 use super::{PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
-use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::node::{Block, Bvh, Child, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidates, Shear};
 
@@ -228,20 +228,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 best.set(i, one);
             });
         } else if child.is_leaf() {
-            for index in child.index().. {
-                let user = bvh.users[index];
-                let (rays, which, n) = gathered(active, |i| best.get(i).ray_for_user(&ray(i)));
-                let mut hits = [None; PACKET];
-                leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
-                for (&i, hit) in which[..n].iter().zip(hits) {
-                    let mut one = best.get(i);
-                    one.offer_user_hit(user & !LAST_USER, hit);
-                    best.set(i, one);
-                }
-                if user & LAST_USER != 0 {
-                    break;
-                }
-            }
+            best.offer_users(bvh, child, leaves, active, ray);
         } else {
             let node = &bvh.nodes[child.index()];
             let far = E::select(active, far, E::splat(f32::NEG_INFINITY));
@@ -322,18 +309,7 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 blocked |= u32::from(walk::any_below::<B, L>(bvh, child, &ray(i), leaves)) << i;
             });
         } else if child.is_leaf() {
-            for index in child.index().. {
-                let user = bvh.users[index];
-                let (rays, which, n) = gathered(active & !blocked, ray);
-                let mut met = [false; PACKET];
-                leaves.occluded_many(user & !LAST_USER, &rays[..n], &mut met[..n]);
-                for (&i, met) in which[..n].iter().zip(met) {
-                    blocked |= u32::from(met) << i;
-                }
-                if user & LAST_USER != 0 {
-                    break;
-                }
-            }
+            blocked |= stopped_by_users(bvh, child, leaves, active, ray);
         } else {
             let node = &bvh.nodes[child.index()];
             let far = E::select(active, ends * padding, E::splat(f32::NEG_INFINITY));

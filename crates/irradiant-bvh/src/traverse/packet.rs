@@ -9,11 +9,11 @@
 
 use super::boxes::{BoxTest, FUSED_LIMIT, FUSED_LOST};
 use super::scalar::counts;
-use super::side_by_side::{Bests, Lines};
+use super::side_by_side::{Bests, Lines, stopped_by_users};
 use super::walk::{self, Stack};
 use super::{PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
-use crate::node::{Block, Bvh, Child, LAST_USER, Node, WIDTH};
+use crate::node::{Block, Bvh, Child, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{self, Candidate, Shear};
 
@@ -405,20 +405,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 best.set(i, one);
             });
         } else if entry.child.is_users() {
-            for index in entry.child.index().. {
-                let user = bvh.users[index];
-                let (rays, which, n) = gathered(active, |i| best.get(i).ray_for_user(&rays[i]));
-                let mut hits = [None; PACKET];
-                leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
-                for (&i, hit) in which[..n].iter().zip(hits) {
-                    let mut one = best.get(i);
-                    one.offer_user_hit(user & !LAST_USER, hit);
-                    best.set(i, one);
-                }
-                if user & LAST_USER != 0 {
-                    break;
-                }
-            }
+            best.offer_users(bvh, entry.child, leaves, active, |i| rays[i]);
         } else {
             for index in entry.child.index().. {
                 let block = &bvh.blocks[index];
@@ -491,18 +478,7 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                 blocked |= u32::from(walk::any_below::<B, L>(bvh, entry.child, &rays[i], leaves)) << i;
             });
         } else if entry.child.is_users() {
-            for index in entry.child.index().. {
-                let user = bvh.users[index];
-                let (rays, which, n) = gathered(active & !blocked, |i| rays[i]);
-                let mut met = [false; PACKET];
-                leaves.occluded_many(user & !LAST_USER, &rays[..n], &mut met[..n]);
-                for (&i, met) in which[..n].iter().zip(met) {
-                    blocked |= u32::from(met) << i;
-                }
-                if user & LAST_USER != 0 {
-                    break;
-                }
-            }
+            blocked |= stopped_by_users(bvh, entry.child, leaves, active, |i| rays[i]);
         } else {
             for index in entry.child.index().. {
                 let block = &bvh.blocks[index];

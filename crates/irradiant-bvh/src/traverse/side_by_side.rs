@@ -1,10 +1,10 @@
 //! The hits of up to sixteen rays, side by side.
 
-use super::packet::{Column, PACKET, each};
+use super::packet::{Column, PACKET, each, gathered};
 use super::scalar::counts;
 use super::{Best, PADDING};
 use crate::lanes::Lanes;
-use crate::node::Block;
+use crate::node::{Block, Bvh, Child, LAST_USER};
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::{Candidate, Candidates};
 
@@ -128,9 +128,60 @@ impl<U: Copy> Bests<U> {
         self.found |= nearer;
     }
 
+    /// Asks about the user primitives of a leaf, for the rays of `active`.
+    #[inline(always)]
+    pub fn offer_users<L: Leaves<UserHit = U>>(
+        &mut self,
+        bvh: &Bvh,
+        leaf: Child,
+        leaves: &L,
+        active: u32,
+        ray: impl Fn(usize) -> Ray,
+    ) {
+        for index in leaf.index().. {
+            let user = bvh.users[index];
+            let (rays, which, n) = gathered(active, |i| self.get(i).ray_for_user(&ray(i)));
+            let mut hits = [None; PACKET];
+            leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
+            for (&i, hit) in which[..n].iter().zip(hits) {
+                let mut one = self.get(i);
+                one.offer_user_hit(user & !LAST_USER, hit);
+                self.set(i, one);
+            }
+            if user & LAST_USER != 0 {
+                break;
+            }
+        }
+    }
+
     /// The answer to ray `i`.
     #[inline(always)]
     pub fn finish(&self, i: usize) -> Option<Closest<U>> {
         self.get(i).finish()
     }
+}
+
+/// Which rays of `active` the user primitives of a leaf stop.
+#[inline(always)]
+pub(super) fn stopped_by_users<L: Leaves>(
+    bvh: &Bvh,
+    leaf: Child,
+    leaves: &L,
+    active: u32,
+    ray: impl Fn(usize) -> Ray,
+) -> u32 {
+    let mut stopped = 0;
+    for index in leaf.index().. {
+        let user = bvh.users[index];
+        let (rays, which, n) = gathered(active & !stopped, &ray);
+        let mut met = [false; PACKET];
+        leaves.occluded_many(user & !LAST_USER, &rays[..n], &mut met[..n]);
+        for (&i, met) in which[..n].iter().zip(met) {
+            stopped |= u32::from(met) << i;
+        }
+        if user & LAST_USER != 0 {
+            break;
+        }
+    }
+    stopped
 }
