@@ -244,6 +244,21 @@ pub(crate) mod x86 {
         }
     }
 
+    /// A function compiled for a set of features, behind a check that the machine has them.
+    macro_rules! entry_point {
+        ($level:expr, $features:literal, fn $name:ident<L>($($argument:ident: $type:ty),* $(,)?) -> $out:ty $body:block) => {
+            #[inline]
+            #[allow(unsafe_code)]
+            pub(crate) fn $name<L: Leaves>($($argument: $type),*) -> $out {
+                #[target_feature(enable = $features)]
+                fn compiled<L: Leaves>($($argument: $type),*) -> $out $body
+                assert!($level <= Level::detect());
+                // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
+                unsafe { compiled($($argument),*) }
+            }
+        };
+    }
+
     /// The walks compiled for one set of features, behind a check that the machine has them. Rays go in as eight numbers, in
     /// registers: reading four at once from memory, just after they were written one by one, has to wait for the writes.
     macro_rules! entry_points {
@@ -306,16 +321,10 @@ pub(crate) mod x86 {
                 unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
             }
 
-            #[inline]
-            #[allow(unsafe_code)]
-            pub(crate) fn $closest_packet<L: Leaves>(
-                bvh: &Bvh,
-                rays: &[Ray],
-                leaves: &L,
-                out: &mut [Option<Closest<L::UserHit>>],
-            ) -> bool {
-                #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(
+            entry_point!(
+                $level,
+                $features,
+                fn $closest_packet<L>(
                     bvh: &Bvh,
                     rays: &[Ray],
                     leaves: &L,
@@ -323,74 +332,42 @@ pub(crate) mod x86 {
                 ) -> bool {
                     packet::closest::<$wide, Fused, L>(bvh, rays, leaves, out)
                 }
-                assert!($level <= Level::detect());
-                // SAFETY: as above.
-                unsafe { compiled(bvh, rays, leaves, out) }
-            }
-
-            #[inline]
-            #[allow(unsafe_code)]
-            pub(crate) fn $any_packet<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
-                #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
+            );
+            entry_point!(
+                $level,
+                $features,
+                fn $any_packet<L>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
                     packet::any::<$wide, Fused, L>(bvh, rays, leaves, out)
                 }
-                assert!($level <= Level::detect());
-                // SAFETY: as above.
-                unsafe { compiled(bvh, rays, leaves, out) }
-            }
-
-            #[inline]
-            #[allow(unsafe_code)]
-            pub(crate) fn $closest_crowd<L: Leaves>(
-                bvh: &Bvh,
-                rays: &[Ray],
-                which: &[u16],
-                octant: usize,
-                leaves: &L,
-                out: &mut [Option<Closest<L::UserHit>>],
-            ) {
-                #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(
+            );
+            entry_point!(
+                $level,
+                $features,
+                fn $closest_crowd<L>(
                     bvh: &Bvh,
                     rays: &[Ray],
                     which: &[u16],
                     octant: usize,
                     leaves: &L,
                     out: &mut [Option<Closest<L::UserHit>>],
-                ) {
-                    crowd::closest::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out);
+                ) -> () {
+                    crowd::closest::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out)
                 }
-                assert!($level <= Level::detect());
-                // SAFETY: as above.
-                unsafe { compiled(bvh, rays, which, octant, leaves, out) }
-            }
-
-            #[inline]
-            #[allow(unsafe_code)]
-            pub(crate) fn $any_crowd<L: Leaves>(
-                bvh: &Bvh,
-                rays: &[Ray],
-                which: &[u16],
-                octant: usize,
-                leaves: &L,
-                out: &mut [bool],
-            ) {
-                #[target_feature(enable = $features)]
-                fn compiled<L: Leaves>(
+            );
+            entry_point!(
+                $level,
+                $features,
+                fn $any_crowd<L>(
                     bvh: &Bvh,
                     rays: &[Ray],
                     which: &[u16],
                     octant: usize,
                     leaves: &L,
                     out: &mut [bool],
-                ) {
-                    crowd::any::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out);
+                ) -> () {
+                    crowd::any::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out)
                 }
-                assert!($level <= Level::detect());
-                // SAFETY: as above.
-                unsafe { compiled(bvh, rays, which, octant, leaves, out) }
-            }
+            );
         };
     }
 
