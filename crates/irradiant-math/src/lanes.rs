@@ -18,18 +18,18 @@ pub type Floats = [f32; LANES];
 /// Three numbers each: points, vectors, normals.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
-pub struct Triples {
+pub struct Triples<const N: usize = LANES> {
     /// First coordinates.
-    pub x: Floats,
+    pub x: [f32; N],
     /// Second ones.
-    pub y: Floats,
+    pub y: [f32; N],
     /// Third ones.
-    pub z: Floats,
+    pub z: [f32; N],
 }
 
-impl Triples {
+impl<const N: usize> Triples<N> {
     /// All zero.
-    pub const ZERO: Self = Self { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
+    pub const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
 
     /// Those of a lane.
     #[inline(always)]

@@ -100,8 +100,11 @@ impl Bvh {
         in_company(self.sorts_rays(level), rays, out, packet, crowd, single);
     }
 
+    /// Rays of a batch that are sorted together.
+    pub const SORTED: usize = 256;
+
     /// Whether rays that go anywhere are faster in one call than one by one (measured on x86 only): in a small tree, and where a ray is expected to meet few nodes.
-    /// They are then sorted by where they go, some 256 at a time.
+    /// They are then sorted by where they go, [`Bvh::SORTED`] at a time.
     pub fn sorts_rays(&self, level: Level) -> bool {
         let is_small = self.nodes.len() <= SMALL || self.report.sah_cost <= SHALLOW;
         level != Level::Scalar && !self.nodes.is_empty() && is_small
@@ -117,8 +120,6 @@ const SMALL: usize = 8;
 ///
 /// In the same way, by expected cost: 1.6 0.98, 0.97 and 1.00 (a million triangles), 2.9 0.98, 3.2 0.99, 3.3 0.94, 3.5 0.99, 4.1 1.06, 6.0 0.97, 7.4 1.03.
 const SHALLOW: f64 = 4.0;
-/// Rays of a batch that are sorted together.
-const SORTED: usize = 256;
 /// Crowds of fewer rays are not worth it.
 const LEAST: usize = 4;
 
@@ -132,8 +133,8 @@ fn in_company<T>(
     mut crowd: impl FnMut(&[Ray], &[u16], usize, &mut [T]),
     single: impl Fn(&Ray) -> T,
 ) {
-    for (rays, out) in rays.chunks(SORTED).zip(out.chunks_mut(SORTED)) {
-        let (mut left, mut n) = ([0; SORTED], 0);
+    for (rays, out) in rays.chunks(Bvh::SORTED).zip(out.chunks_mut(Bvh::SORTED)) {
+        let (mut left, mut n) = ([0; Bvh::SORTED], 0);
         for (first, (rays, out)) in (0..).step_by(PACKET).zip(rays.chunks(PACKET).zip(out.chunks_mut(PACKET))) {
             if packet(rays, out) {
                 continue;
@@ -168,7 +169,7 @@ fn in_crowds<T>(
     crowd: &mut impl FnMut(&[Ray], &[u16], usize, &mut [T]),
     single: &impl Fn(&Ray) -> T,
 ) {
-    let (mut kinds, mut places) = ([0; SORTED], [0; crowd::KINDS + 1]);
+    let (mut kinds, mut places) = ([0; Bvh::SORTED], [0; crowd::KINDS + 1]);
     for (kind, &i) in kinds.iter_mut().zip(which) {
         *kind = crowd::kind(&rays[i as usize]);
         places[*kind + 1] += 1;
@@ -176,7 +177,7 @@ fn in_crowds<T>(
     for kind in 0..crowd::KINDS {
         places[kind + 1] += places[kind];
     }
-    let mut sorted = [0; SORTED];
+    let mut sorted = [0; Bvh::SORTED];
     for (&kind, &i) in kinds.iter().zip(which) {
         sorted[places[kind]] = i;
         places[kind] += 1;

@@ -95,7 +95,7 @@ fn hit_of(closest: bvh::Closest<Hit>) -> Hit {
 /// Rays that go to a tree in one call: few enough to stay in the nearest cache with their answers.
 const BATCH: usize = 64;
 /// The same where the tree sorts them by where they go.
-const SORTED_BATCH: usize = 256;
+const SORTED_BATCH: usize = bvh::Bvh::SORTED;
 
 /// As the tree wants them; at most `N`.
 fn gathered<const N: usize>(rays: &[Ray], t_max: &[f32]) -> [bvh::Ray; N] {

@@ -8,8 +8,8 @@ use irradiant_core::bxdf::fresnel::fresnel_conductor_at;
 use irradiant_core::bxdf::{Conductor, Ggx, is_usable};
 use irradiant_core::geometry::{Kernel, SurfaceLanes};
 use irradiant_core::interaction::{MaterialId, ReferencePoint};
-use irradiant_math::lanes::LANES;
-use irradiant_math::{Frame, Normal3, Point3, Vec3};
+use irradiant_math::lanes::{LANES, Triples};
+use irradiant_math::{Frame, Normal3, Vec3};
 use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
@@ -38,37 +38,7 @@ pub(crate) enum Kind {
 pub(super) type Sixteen = [f32; PIXELS];
 
 /// Three numbers of each.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Three {
-    x: Sixteen,
-    y: Sixteen,
-    z: Sixteen,
-}
-
-impl Three {
-    const ZERO: Self = Self { x: [0.0; PIXELS], y: [0.0; PIXELS], z: [0.0; PIXELS] };
-
-    #[inline(always)]
-    pub fn vector(&self, i: usize) -> Vec3 {
-        Vec3::new(self.x[i], self.y[i], self.z[i])
-    }
-
-    #[inline(always)]
-    pub fn point(&self, i: usize) -> Point3 {
-        Point3::new(self.x[i], self.y[i], self.z[i])
-    }
-
-    #[inline(always)]
-    fn normal(&self, i: usize) -> Normal3 {
-        Normal3::new(self.x[i], self.y[i], self.z[i])
-    }
-
-    #[inline(always)]
-    pub fn set(&mut self, i: usize, [x, y, z]: [f32; 3]) {
-        (self.x[i], self.y[i], self.z[i]) = (x, y, z);
-    }
-}
+pub(super) type Three = Triples<PIXELS>;
 
 /// One spectrum of each: a row for each wavelength.
 pub(super) type Spectra = [Sixteen; N_WAVELENGTHS];
