@@ -14,6 +14,7 @@
 use crate::integrator::RenderStats;
 use crate::path::power_heuristic;
 use crate::record::{Contribution, PathRecorder, Technique};
+use crate::shared_path::sky::{Glimpse, SharedSky};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::interaction::{Interaction, LightId, ReferencePoint};
@@ -97,7 +98,7 @@ pub(crate) fn all_are_sampled(scene: &Scene, splits: u32) -> bool {
 }
 
 /// Light that arrives straight from sampled points of sampled lights and is scattered along the path, the choice of the light split into
-/// `splits` strata.
+/// `splits` strata. Samples of the light `except` are drawn, but do not count.
 #[inline(always)]
 pub(crate) fn direct_light<R: PathRecorder>(
     scene: &Scene,
@@ -108,14 +109,18 @@ pub(crate) fn direct_light<R: PathRecorder>(
     draws: &LightDraws,
     prepared: Option<PixelRun>,
     splits: u32,
+    except: Option<LightId>,
     depth: u32,
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
     if strata(scene, splits) > 1 {
-        return split_light(scene, at, bsdf, throughput, lambda, draws, prepared, splits, depth, stats, recorder);
+        return split_light(
+            scene, at, bsdf, throughput, lambda, draws, prepared, splits, except, depth, stats, recorder,
+        );
     }
     if let Some(picked) = scene.light_sampler.sample(&at.reference(), draws.pick)
+        && except != Some(picked.id)
         && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
     {
         return scattered(scene, at, bsdf, throughput, arriving, picked.pmf, 1.0, depth, stats, recorder);
@@ -135,18 +140,34 @@ fn split_light<R: PathRecorder>(
     draws: &LightDraws,
     prepared: Option<PixelRun>,
     splits: u32,
+    except: Option<LightId>,
     depth: u32,
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
     let mut sum = SampledSpectrum::ZERO;
     for (picked, share) in PickedLights::of(scene, &at.reference(), draws, splits).iter() {
-        if let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared) {
+        if except != Some(picked.id)
+            && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
+        {
             let samples = samples_by_chance(picked.pmf, splits);
             sum += scattered(scene, at, bsdf, throughput, arriving, samples, share, depth, stats, recorder);
         }
     }
     sum
+}
+
+/// The sample of the sky among the light samples at a first vertex, if there is one; whether it is seen is not known yet.
+pub(crate) fn sky_sample(
+    scene: &Scene,
+    at: &Interaction,
+    draws: &LightDraws,
+    splits: u32,
+    sky: &SharedSky,
+) -> Option<Glimpse> {
+    let picked = PickedLights::of(scene, &at.reference(), draws, splits);
+    let (PickedLight { pmf, .. }, share) = picked.iter().find(|(picked, _)| picked.id == sky.id)?;
+    Some(Glimpse { point: sky.sky.draw(draws.uv)?, factor: sky.factor(share, pmf), sees: false })
 }
 
 /// Strata into which a choice of light is split: one light needs no choice.

@@ -381,6 +381,7 @@ impl PathIntegrator {
                     &draws,
                     run,
                     self.light_splits_at(depth),
+                    None,
                     depth,
                     stats,
                     recorder,

@@ -306,7 +306,7 @@ fn assert_same_bits(text: &str, integrator: SharedPathIntegrator) {
 
 /// So many light samples at the first surface.
 fn lights(light_splits: u32) -> SharedPathIntegrator {
-    SharedPathIntegrator { max_depth: None, light_splits }
+    SharedPathIntegrator { max_depth: None, light_splits, sky_tests: 4 }
 }
 
 /// A rectangle of two flat triangles, whose normals point to where its corners go round against the clock.

@@ -11,7 +11,7 @@ use super::origin::{LightOrigin, LightOrigins};
 use super::portal::{PortalError, PortalInfiniteLight};
 use super::projection::{ProjectionLight, Screen};
 use super::{
-    DistantLight, Emission, GoniometricLight, ImageInfiniteLight, Light, PointLight, SceneSphere, SpotLight,
+    DistantLight, Emission, GoniometricLight, ImageInfiniteLight, Light, PointLight, SceneSphere, Sky, SpotLight,
     UniformInfiniteLight,
 };
 use crate::geometry::{Alpha, EmitterShape, Geometry};
@@ -174,6 +174,18 @@ impl Lights {
     #[inline]
     pub fn place_of_escape(&self, direction: Vec3) -> Option<Point2> {
         self.sky().map(|(_, light)| light.place(direction))
+    }
+
+    /// The one environment there is, if it looks the same from everywhere.
+    pub fn only_sky(&self) -> Option<(LightId, Sky<'_>)> {
+        match self.environments[..] {
+            [only] => match &self.list[only.0 as usize] {
+                Light::ImageInfinite(light) => Some((only, Sky::Image(light))),
+                Light::UniformInfinite(light) => Some((only, Sky::Uniform(light))),
+                _ => None,
+            },
+            _ => None,
+        }
     }
 
     /// The one environment there is, if it is an image: its samples can be drawn in steps.

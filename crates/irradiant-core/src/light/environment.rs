@@ -75,6 +75,62 @@ impl UniformInfiniteLight {
     }
 }
 
+/// A direction to a sky and what shines there, whatever the wavelengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyPoint {
+    /// Unit, render space.
+    pub wi: Vec3,
+    /// Density with which light samples that are weighed against hits find it, 1/sr.
+    pub pdf: f32,
+    /// The colour of the image; 1 where there is none.
+    pub rgb: [f32; 3],
+}
+
+/// An environment that is the same from everywhere in the scene.
+#[derive(Clone, Copy, Debug)]
+pub enum Sky<'a> {
+    /// The same in all directions.
+    Uniform(&'a UniformInfiniteLight),
+    /// An image.
+    Image(&'a ImageInfiniteLight),
+}
+
+impl Sky<'_> {
+    /// The point that light samples draw which are weighed against hits; `None` where they draw none.
+    #[inline]
+    pub fn draw(&self, u: Point2) -> Option<SkyPoint> {
+        match self {
+            Self::Uniform(_) => None,
+            Self::Image(light) => {
+                let s = light.density(SampleMode::Compensated).sample(&light.image, u)?;
+                let (wi, pdf) = light.direction(s.uv, s.pdf);
+                Some(SkyPoint { wi, pdf, rgb: s.rgb })
+            }
+        }
+    }
+
+    /// What is in this direction, whose `place` in the image may be known ([`ImageInfiniteLight::place`]).
+    #[inline]
+    pub fn look(&self, wi: Vec3, place: Option<Point2>) -> SkyPoint {
+        match self {
+            Self::Uniform(light) => SkyPoint { wi, pdf: light.pdf(SampleMode::Compensated), rgb: [1.0; 3] },
+            Self::Image(light) => {
+                let rgb = light.image.nearest(place.unwrap_or_else(|| light.place(wi)));
+                SkyPoint { wi, pdf: light.pdf_of(rgb, wi, SampleMode::Compensated), rgb }
+            }
+        }
+    }
+
+    /// Radiance at a point.
+    #[inline]
+    pub fn radiance(&self, point: &SkyPoint, lambda: &Wavelengths) -> SampledSpectrum {
+        match self {
+            Self::Uniform(light) => light.radiance.sample(lambda),
+            Self::Image(light) => light.radiance(point.rgb, lambda),
+        }
+    }
+}
+
 /// Radiance by direction from an image.
 #[derive(Debug)]
 pub struct ImageInfiniteLight {
@@ -118,6 +174,7 @@ impl ImageInfiniteLight {
         })
     }
 
+    /// Radiance where the image has this colour.
     #[inline]
     fn radiance(&self, rgb: [f32; 3], lambda: &Wavelengths) -> SampledSpectrum {
         self.image.radiance(rgb, lambda) * self.scale

@@ -41,7 +41,7 @@ pub use bounds::LightBounds;
 pub use compile::{LightContext, Lights};
 pub use distant::DistantLight;
 pub use emission::{Emission, RadianceImage};
-pub use environment::{ImageInfiniteLight, UniformInfiniteLight};
+pub use environment::{ImageInfiniteLight, Sky, SkyPoint, UniformInfiniteLight};
 pub use environment_density::{PixelLine, PixelRun};
 pub use goniometric::GoniometricLight;
 pub use orientation::Orientation;

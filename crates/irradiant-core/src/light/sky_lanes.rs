@@ -13,6 +13,8 @@ pub struct SkyLanes {
     v: Floats,
     /// Densities over the image.
     pdf: Floats,
+    /// Colours.
+    rgb: [[f32; 3]; LANES],
     /// 1 where one was drawn.
     is_drawn: [u32; LANES],
     // Directions, before they go to the lanes that have one, and their densities.
@@ -26,6 +28,7 @@ impl SkyLanes {
         u: [0.0; LANES],
         v: [0.0; LANES],
         pdf: [0.0; LANES],
+        rgb: [[0.0; 3]; LANES],
         is_drawn: [0; LANES],
         wi: Triples::ZERO,
         per_angle: [0.0; LANES],
@@ -49,7 +52,14 @@ impl SkyLanes {
     ) -> Option<SampledSpectrum> {
         let (sample, radiance) = sky.arrive_at(run, lambda, mode)?;
         (self.u[i], self.v[i], self.pdf[i], self.is_drawn[i]) = (sample.uv.x, sample.uv.y, sample.pdf, 1);
+        self.rgb[i] = sample.rgb;
         Some(radiance)
+    }
+
+    /// The colour of the image at the point drawn for a lane, `None` if none is.
+    #[inline(always)]
+    pub fn rgb(&self, i: usize) -> Option<[f32; 3]> {
+        (self.is_drawn[i] != 0).then_some(self.rgb[i])
     }
 
     /// For those of `n` lanes that have arrived the directions and densities, to the bit: into `out`.

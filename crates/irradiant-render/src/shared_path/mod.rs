@@ -13,8 +13,9 @@
 //! Which pixels take part must not depend on what their paths do, or the sum over k would not be the density of what is there: a first vertex
 //! takes part as soon as the camera sees it, also when its own path draws no direction; and no path ends because it is of no use to its own pixel.
 //!
-//! What is shared: second vertices on diffuse surfaces, leaves and rough metals, for first vertices on the same. All else (direct light at the
-//! first vertex, lamps that the path meets, other materials) is each pixel's own, as in [`path`](crate::path).
+//! What is shared: second vertices on diffuse surfaces, leaves and rough metals, for first vertices on the same; and, for these too, the sky, if it is the only
+//! environment ([`sky`]). All else (direct light of lamps at the first vertex, lamps that the path meets, other materials) is each pixel's own, as
+//! in [`path`](crate::path).
 //!
 //! Errors of the pixels of a block go together: a picture has less noise per pixel but what is left is blotchy, and the mean over
 //! many pixels has the error that [`path`](crate::path) would give it. All of a block share the time; each path has wavelengths of its
@@ -22,14 +23,15 @@
 
 pub(crate) mod blocks;
 mod share;
+pub(crate) mod sky;
 mod staged;
 
 use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, Renderer, WorkUnit};
-use crate::light_samples::{check_splits, direct_light, pick_light};
+use crate::light_samples::{check_splits, direct_light, pick_light, sky_sample};
 use crate::path::{PathIntegrator, Previous, Walk, lights_option, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
-use crate::registry::{IntegratorEntry, LIGHT_SAMPLER};
+use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{BsdfSample, Bxdf, Sides, TransportMode};
 use irradiant_core::film::{FilmTile, PixelBounds};
@@ -38,6 +40,7 @@ use irradiant_core::sampler::{CameraDraws, ScatterDraws};
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point3, Ray, Vec3};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use sky::{GLIMPSES, Glimpse, SharedSky};
 use std::ops::Range;
 
 /// Side of a block, pixels.
@@ -54,8 +57,18 @@ pub const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "sharedpath",
     promise: "path tracing whose indirect light is shared among the pixels of a block",
     source: "Bekaert, Sbert and Halton 2002",
-    options: &[lights_option(8), LIGHT_SAMPLER],
-    make: |options, max_depth| Box::new(SharedPathIntegrator { max_depth, light_splits: options.count("lights") }),
+    options: &[lights_option(8), SKY, LIGHT_SAMPLER],
+    make: |options, max_depth| {
+        let (light_splits, sky_tests) = (options.count("lights"), options.count("sky"));
+        Box::new(SharedPathIntegrator { max_depth, light_splits, sky_tests })
+    },
+};
+
+const SKY: OptionEntry = OptionEntry {
+    name: "sky",
+    range: OptionRange::Count(0, GLIMPSES as u32),
+    default: Value::Count(4),
+    doc: "directions to the sky that neighbouring pixels found and a pixel tests too; 0: the sky is not shared",
 };
 
 /// What can be set.
@@ -65,6 +78,8 @@ pub struct SharedPathIntegrator {
     pub max_depth: Option<u32>,
     /// Strata of the choice of a light at the first surface, 1 to 64.
     pub light_splits: u32,
+    /// Directions to the sky, found by others of its block, that a pixel tests for each sample; 0: the sky is not shared.
+    pub sky_tests: u32,
 }
 
 /// A surface that the camera sees.
@@ -120,6 +135,15 @@ struct Member<'a> {
     second: Option<Second>,
 }
 
+/// How a path looks for the sky from its first vertex, if that takes part.
+struct Looks<'a> {
+    sky: Option<&'a SharedSky<'a>>,
+    /// By a light sample, if it draws one, which may be of another light.
+    light: Option<Option<Glimpse>>,
+    /// Along the direction that it takes.
+    drawn: Option<Glimpse>,
+}
+
 /// What blocks need not allocate anew.
 #[derive(Default)]
 struct Scratch<'a> {
@@ -133,6 +157,10 @@ struct Scratch<'a> {
     pairs: Vec<share::Pair>,
     /// Of all second vertices that scatter by their BSDF.
     incoming: Vec<Incoming>,
+    /// Directions to the sky: the members' light samples, then those of their BSDFs.
+    glimpses: [Option<Glimpse>; GLIMPSES],
+    /// First vertices that draw light samples.
+    seeking: u32,
 }
 
 impl Integrator for SharedPathIntegrator {
@@ -142,7 +170,7 @@ impl Integrator for SharedPathIntegrator {
 
     fn renderer<'a>(&'a self, scene: &'a Scene) -> Renderer<'a> {
         let path = self.path();
-        if path.has_stages(scene) {
+        if path.has_stages(scene) && SharedSky::of(scene, &path, self.sky_tests).is_none() {
             staged::renderer(path, scene)
         } else {
             Box::new(move |unit, tile, stats| self.render_alone(scene, unit, tile, stats))
@@ -181,10 +209,11 @@ impl SharedPathIntegrator {
         let bounds = &unit.bounds;
         let mut scratch = Scratch::default();
         scratch.layers.resize(scene.layers.channels() * PIXELS, 0.0);
+        let sky = SharedSky::of(scene, &self.path(), self.sky_tests);
         let channels = scene.layers.channels();
         for block in blocks_of(bounds) {
             for index in unit.samples.clone() {
-                self.block(scene, &block, index, &mut scratch, stats);
+                self.block(scene, sky.as_ref(), &block, index, &mut scratch, stats);
                 for (i, member) in scratch.members.iter().enumerate() {
                     let [x, y] = member.sample.pixel;
                     if x < bounds.x0 || x >= bounds.x1 || y < bounds.y0 || y >= bounds.y1 {
@@ -208,13 +237,15 @@ impl SharedPathIntegrator {
     fn block<'a>(
         &self,
         scene: &'a Scene,
+        sky: Option<&SharedSky>,
         block: &PixelBounds,
         index: u32,
         scratch: &mut Scratch<'a>,
         stats: &mut RenderStats,
     ) {
-        let Scratch { members, layers, camera_rays, ends, incoming, .. } = scratch;
+        let Scratch { members, layers, camera_rays, ends, incoming, glimpses, seeking, .. } = scratch;
         incoming.clear();
+        (*glimpses, *seeking) = ([None; GLIMPSES], 0);
         members.clear();
         members.extend(samples_of_block(scene, block, index).map(|sample| Member {
             lambda: sample.lambda,
@@ -244,10 +275,16 @@ impl SharedPathIntegrator {
             let layers = &mut layers[i * channels..(i + 1) * channels];
             let mut lambda = member.lambda;
             let walk = Walk::from_camera(camera_ray.ray, hits[i]);
-            self.trace(scene, member, walk, &mut lambda, layers, stats, incoming);
+            let mut looks = Looks { sky, light: None, drawn: None };
+            self.trace(scene, member, walk, &mut lambda, layers, stats, incoming, &mut looks);
             member.lambda = lambda;
+            (glimpses[i], glimpses[PIXELS + i]) = (looks.light.flatten(), looks.drawn);
+            *seeking += u32::from(looks.light.is_some());
         }
         share::share(scene, scratch, stats);
+        if let Some(sky) = sky {
+            sky::share_sky(scene, sky, scratch, stats);
+        }
         let Scratch { members, layers, .. } = scratch;
         for (i, member) in members.iter().enumerate() {
             let layers = &mut layers[i * channels..(i + 1) * channels];
@@ -267,6 +304,7 @@ impl SharedPathIntegrator {
         layers: &mut [f32],
         stats: &mut RenderStats,
         incoming: &mut Vec<Incoming>,
+        looks: &mut Looks,
     ) {
         let path = self.path();
         let Some(camera_ray) = member.sample.camera_ray else { return };
@@ -292,11 +330,16 @@ impl SharedPathIntegrator {
         if path.is_at_limit(0) {
             return;
         }
+        let sky = looks.sky.filter(|_| gains(&bsdf));
         if bsdf.flags().is_non_specular() {
             let (draws, one) = (stream.light(0), SampledSpectrum::ONE);
             let splits = path.light_splits_at(0);
+            if let Some(sky) = sky {
+                looks.light = Some(sky_sample(scene, &at, &draws, splits, sky));
+            }
+            let except = sky.map(|sky| sky.id);
             member.radiance +=
-                direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, splits, 0, stats, &mut NoRecord);
+                direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, splits, except, 0, stats, &mut NoRecord);
         }
         if gains(&bsdf) {
             let drawn = draw(&bsdf, at.wo, &stream.scatter(0));
@@ -305,7 +348,14 @@ impl SharedPathIntegrator {
                 path.go(scene, &at, &bsdf, sample, &mut walk, stats);
             }
             member.first = Some(First { at, footprint, bsdf });
-            if let Some(BsdfSample { pdf, .. }) = drawn {
+            if let Some(BsdfSample { pdf, wi, .. }) = drawn {
+                if let Some(sky) = sky {
+                    let sees = walk.met.is_none();
+                    looks.drawn = Some(Glimpse { point: sky.sky.look(wi, None), factor: 1.0, sees });
+                    if sees {
+                        return;
+                    }
+                }
                 self.second(&path, scene, member, walk, pdf, lambda, stats, incoming);
             }
         } else if path.scatter(scene, &at, &bsdf, &mut walk, &stream, stats, &mut NoRecord).is_none() {
@@ -344,7 +394,7 @@ impl SharedPathIntegrator {
         }
         let direct_light = |throughput, lambda: &_, stats: &mut _| {
             let draws = stream.light(1);
-            direct_light(scene, &at, &bsdf, throughput, lambda, &draws, None, 1, 1, stats, &mut NoRecord)
+            direct_light(scene, &at, &bsdf, throughput, lambda, &draws, None, 1, None, 1, stats, &mut NoRecord)
         };
         if !is_shared(&bsdf) {
             if walk.throughput.is_black() {

@@ -273,6 +273,7 @@ impl Batch {
             &self.light.light_draws(i),
             None,
             1,
+            None,
             depth,
             stats,
             &mut NoRecord,
