@@ -1,6 +1,7 @@
 //! The vertices of some blocks' paths side by side, and what of their connections is computed in lanes: a block's sixteen first vertices are the
 //! lanes of a loop.
 
+use super::sky::{GLIMPSES, Glimpse};
 use super::{Incoming, PIXELS, Second};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::mirror_lobe;
@@ -35,7 +36,7 @@ pub(crate) enum Kind {
 }
 
 /// One number of each pixel of a block.
-pub(super) type Sixteen = [f32; PIXELS];
+pub(crate) type Sixteen = [f32; PIXELS];
 
 /// Three numbers of each.
 pub(super) type Three = Triples<PIXELS>;
@@ -79,9 +80,9 @@ pub(crate) enum FirstScattering<'a> {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Receivers {
-    p: Three,
-    p_error: Three,
-    n: Three,
+    pub p: Three,
+    pub p_error: Three,
+    pub n: Three,
     x: Three,
     y: Three,
     z: Three,
@@ -127,6 +128,49 @@ impl Receivers {
         Frame { x: self.x.vector(i), y: self.y.vector(i), z: self.z.vector(i) }
     }
 
+    /// What plain vertices scatter of light from these directions, with the cosine, the densities with which they find it, 1/sr, and
+    /// whether it is anything.
+    #[inline(always)]
+    pub fn scatter(&self, wi: &Three, f_cos: &mut Spectra, pdf: &mut Sixteen, scatters: &mut [u32; PIXELS]) {
+        let mut cosine = [0.0; PIXELS];
+        for i in 0..PIXELS {
+            let wi = wi.vector(i);
+            let (local_o, local_i) = (self.wo.vector(i), self.frame(i).to_local(wi));
+            let is_above = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
+            cosine[i] = wi.dot(self.z.vector(i)).abs();
+            pdf[i] = if is_above { local_i.z.abs() * FRAC_1_PI } else { 0.0 };
+        }
+        *f_cos = self.f;
+        if self.is_metal.iter().fold(0, |any, metal| any | metal) != 0 {
+            let (mut facet, mut value) = ([0.0; PIXELS], [0.0; PIXELS]);
+            for i in 0..PIXELS {
+                let (local_o, local_i) = (self.wo.vector(i), self.frame(i).to_local(wi.vector(i)));
+                let (lobe, is_lit) = mirror_lobe(&Ggx::new(self.alphas[0][i], self.alphas[1][i]), local_o, local_i);
+                let is_found = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
+                let found = if is_found { lobe.pdf } else { 0.0 };
+                pdf[i] = if self.is_metal[i] != 0 { found } else { pdf[i] };
+                (facet[i], value[i]) = (lobe.cos, lobe.value);
+            }
+            for k in 0..N_WAVELENGTHS {
+                for i in 0..PIXELS {
+                    let f = fresnel_conductor_at(facet[i], self.eta[k][i], self.k[k][i]) * value[i];
+                    f_cos[k][i] = if self.is_metal[i] != 0 { f } else { f_cos[k][i] };
+                }
+            }
+        }
+        let (mut is_black, mut is_finite) = ([1; PIXELS], [1; PIXELS]);
+        for k in 0..N_WAVELENGTHS {
+            for i in 0..PIXELS {
+                is_finite[i] &= u32::from(f_cos[k][i].abs() < f32::INFINITY);
+                f_cos[k][i] *= cosine[i];
+                is_black[i] &= u32::from(f_cos[k][i] == 0.0);
+            }
+        }
+        for i in 0..PIXELS {
+            scatters[i] = u32::from(is_black[i] == 0) & is_finite[i] & self.is_plain[i];
+        }
+    }
+
     /// At the wavelengths of a path.
     pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
         set_spectrum(&mut self.f, i, reflectance * FRAC_1_PI);
@@ -168,6 +212,13 @@ pub(crate) struct Blocks {
     pub bsdfs: Vec<Bsdf>,
     /// What arrives at second vertices; in the end, one's after another's.
     pub incoming: Vec<(u32, Incoming)>,
+    // For each block, if the sky is shared:
+    /// Directions to it: light samples, then those of BSDFs.
+    pub glimpses: Vec<[Option<Glimpse>; GLIMPSES]>,
+    /// First vertices that draw light samples.
+    pub seeking: Vec<u32>,
+    /// A random number of each pixel.
+    pub marks: Vec<Sixteen>,
 }
 
 impl Blocks {
@@ -183,6 +234,9 @@ impl Blocks {
             seconds: Vec::new(),
             bsdfs: Vec::new(),
             incoming: Vec::new(),
+            glimpses: Vec::new(),
+            seeking: Vec::new(),
+            marks: Vec::new(),
         }
     }
 
@@ -206,6 +260,16 @@ impl Blocks {
         self.seconds.clear();
         self.seconds.resize_with(samples, || None);
         self.incoming.clear();
+        let blocks = samples.div_ceil(PIXELS);
+        fill(&mut self.glimpses, blocks, [None; GLIMPSES]);
+        fill(&mut self.seeking, blocks, 0);
+        fill(&mut self.marks, blocks, [0.0; PIXELS]);
+    }
+
+    /// Notes a direction in which a path looked for the sky from its first vertex, by a light sample or as its BSDF has it.
+    pub fn set_glimpse(&mut self, s: usize, is_light_sample: bool, glimpse: Glimpse) {
+        let place = if is_light_sample { 0 } else { PIXELS } + s % PIXELS;
+        self.glimpses[s / PIXELS][place] = Some(glimpse);
     }
 
     /// Notes the first vertex of a path: that of lane `i`, and its material if it is that of a flat triangle.
@@ -350,18 +414,15 @@ impl Kernel for Meet<'_> {
         let Self { receivers: r, place, side, out } = self;
         let ReferencePoint { p, p_error, n, .. } = *place;
         let (has_side, side) = (side.is_some(), side.unwrap_or(Vec3::ZERO));
-        let (mut cosine, mut pdf) = ([0.0; PIXELS], [0.0; PIXELS]);
+        let (mut wi, mut pdf) = (Three::ZERO, [0.0; PIXELS]);
         for i in 0..PIXELS {
             let d = p - r.p.point(i);
             let r2 = d.length_squared();
-            let wi = d * (1.0 / r2.sqrt());
-            let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(wi));
-            let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
-            out.wo.set(i, (-wi).to_array());
-            out.there[i] = wi.dot_normal(n).abs() / r2;
-            cosine[i] = wi.dot(r.z.vector(i)).abs();
-            pdf[i] = if scatters { local_i.z.abs() * FRAC_1_PI } else { 0.0 };
-            out.leaves[i] = u32::from(!has_side | (wi.dot(side) < 0.0));
+            let towards = d * (1.0 / r2.sqrt());
+            wi.set(i, towards.to_array());
+            out.wo.set(i, (-towards).to_array());
+            out.there[i] = towards.dot_normal(n).abs() / r2;
+            out.leaves[i] = u32::from(!has_side | (towards.dot(side) < 0.0));
         }
         for i in 0..PIXELS {
             let from =
@@ -370,38 +431,16 @@ impl Kernel for Meet<'_> {
             out.o.set(i, ray.o.to_array());
             out.d.set(i, ray.d.to_array());
         }
-        out.f = r.f;
-        if r.is_metal.iter().fold(0, |any, metal| any | metal) != 0 {
-            let (mut facet, mut value) = ([0.0; PIXELS], [0.0; PIXELS]);
-            for i in 0..PIXELS {
-                let (local_o, local_i) = (r.wo.vector(i), r.frame(i).to_local(-out.wo.vector(i)));
-                let (lobe, is_lit) = mirror_lobe(&Ggx::new(r.alphas[0][i], r.alphas[1][i]), local_o, local_i);
-                let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
-                let found = if scatters { lobe.pdf } else { 0.0 };
-                pdf[i] = if r.is_metal[i] != 0 { found } else { pdf[i] };
-                (facet[i], value[i]) = (lobe.cos, lobe.value);
-            }
-            for k in 0..N_WAVELENGTHS {
-                for i in 0..PIXELS {
-                    let f = fresnel_conductor_at(facet[i], r.eta[k][i], r.k[k][i]) * value[i];
-                    out.f[k][i] = if r.is_metal[i] != 0 { f } else { out.f[k][i] };
-                }
-            }
-        }
-        let (mut is_black, mut is_finite) = ([1; PIXELS], [1; PIXELS]);
+        r.scatter(&wi, &mut out.f, &mut pdf, &mut out.is_joined);
         for k in 0..N_WAVELENGTHS {
             for i in 0..PIXELS {
-                is_finite[i] &= u32::from(out.f[k][i].abs() < f32::INFINITY);
-                let f_cos = out.f[k][i] * cosine[i];
-                is_black[i] &= u32::from(f_cos == 0.0);
-                out.f[k][i] = f_cos * out.there[i];
+                out.f[k][i] *= out.there[i];
             }
         }
         for i in 0..PIXELS {
             let pdf = pdf[i] * out.there[i];
             // Directions in which nothing is scattered are never drawn.
-            let is_joined = (pdf > 0.0) & (pdf < f32::INFINITY) & (is_black[i] == 0);
-            out.is_joined[i] = u32::from(is_joined) & is_finite[i] & r.is_plain[i] & out.leaves[i];
+            out.is_joined[i] &= u32::from((pdf > 0.0) & (pdf < f32::INFINITY)) & out.leaves[i];
             out.pdf[i] = pdf;
         }
     }

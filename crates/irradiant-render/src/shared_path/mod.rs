@@ -24,6 +24,7 @@
 pub(crate) mod blocks;
 mod share;
 pub(crate) mod sky;
+mod sky_lanes;
 mod staged;
 
 use crate::camera_samples::{CameraSample, camera_sample_by};
@@ -50,7 +51,7 @@ use std::ops::Range;
 /// blocks that lie elsewhere in each sample look better, since their borders do not show, but 4 pixels are then at 0.20 and 0.34.
 const SIDE: i32 = 4;
 /// Pixels of a block.
-const PIXELS: usize = (SIDE * SIDE) as usize;
+pub(crate) const PIXELS: usize = (SIDE * SIDE) as usize;
 
 /// By name.
 pub const ENTRY: IntegratorEntry = IntegratorEntry {
@@ -170,8 +171,8 @@ impl Integrator for SharedPathIntegrator {
 
     fn renderer<'a>(&'a self, scene: &'a Scene) -> Renderer<'a> {
         let path = self.path();
-        if path.has_stages(scene) && SharedSky::of(scene, &path, self.sky_tests).is_none() {
-            staged::renderer(path, scene)
+        if path.has_stages(scene) {
+            staged::renderer(path, self.sky_tests, scene)
         } else {
             Box::new(move |unit, tile, stats| self.render_alone(scene, unit, tile, stats))
         }

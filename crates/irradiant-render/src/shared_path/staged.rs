@@ -4,6 +4,8 @@ use super::blocks::{
     BLOCKS, Blocks, GiveByMetal, GiveEvenly, Leaving, Meet, Meeting, Model, Respond, Sixteen, Spectra, set_spectrum,
     spectrum,
 };
+use super::sky::SharedSky;
+use super::sky_lanes::Outlooks;
 use super::{Incoming, PIXELS, blocks_of, film_rgb, pixels_of};
 use crate::camera_samples::{CameraSample, SampleBatch};
 use crate::integrator::{RenderStats, Renderer};
@@ -31,15 +33,19 @@ struct Joints {
 }
 
 /// Takes units' samples, many at a time, of a scene that has stages for `path`.
-pub(super) fn renderer<'a>(path: PathIntegrator, scene: &'a Scene) -> Renderer<'a> {
+pub(super) fn renderer<'a>(path: PathIntegrator, sky_tests: u32, scene: &'a Scene) -> Renderer<'a> {
     let (mut batch, mut samples) = (Batch::new(scene), SampleBatch::new(scene));
-    let (mut blocks, mut joints) = (Blocks::new(), Joints::new());
+    let (mut blocks, mut joints, mut outlooks) = (Blocks::new(), Joints::new(), Outlooks::new());
+    let sky = SharedSky::of(scene, &path, sky_tests);
     Box::new(move |unit, tile, stats| {
         let mut take = |samples: &mut SampleBatch<'a>| {
             samples.trace(scene, PIXELS);
             let (samples, hits) = samples.traced();
             stats.camera_rays += samples.iter().filter(|sample| sample.camera_ray.is_some()).count() as u64;
-            path.shared_batch(&mut batch, scene, samples, hits, &mut blocks, stats);
+            path.shared_batch(&mut batch, scene, sky.as_ref(), samples, hits, &mut blocks, stats);
+            if let Some(sky) = &sky {
+                outlooks.share(scene, sky, samples, &mut blocks, stats);
+            }
             joints.share(scene, samples, hits, &mut blocks, stats);
             for (s, sample) in samples.iter().enumerate() {
                 let ([x, y], b) = (sample.pixel, &unit.bounds);

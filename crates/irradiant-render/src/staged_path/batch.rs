@@ -9,7 +9,7 @@ use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
 use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
-use irradiant_core::light::{ImageInfiniteLight, PixelLine, PixelRun, SkyLanes, TargetLanes};
+use irradiant_core::light::{ImageInfiniteLight, PixelLine, PixelRun, SkyLanes, SkyPoint, TargetLanes};
 use irradiant_core::light_sampler::{PickedLight, TreeLanes};
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
@@ -155,6 +155,9 @@ pub(crate) struct Batch {
     pub(super) light_picks: Vec<(PickedLight, u32)>,
     pub(super) light_counts: [u32; LANES],
     pub(super) light_pick: Floats,
+    /// The sky, while vertices share it, and their samples of it: lane, point, share of all samples, chance.
+    pub(super) shared_sky: Option<LightId>,
+    pub(super) sky_samples: Vec<(u32, SkyPoint, f32, f32)>,
     pub(super) shadow_rays: Vec<Ray>,
     pub(super) shadow_ends: Vec<f32>,
     /// The sample that each would bring this to.
@@ -226,6 +229,8 @@ impl Batch {
             light_picks: Vec::new(),
             light_counts: [0; LANES],
             light_pick: [0.0; LANES],
+            shared_sky: None,
+            sky_samples: Vec::new(),
             shadow_rays: Vec::new(),
             shadow_ends: Vec::new(),
             shadow_light: Vec::new(),

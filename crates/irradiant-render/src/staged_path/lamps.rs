@@ -100,6 +100,9 @@ impl Batch {
         if any {
             scene.geometry.level().run(Weigh(self, n));
         }
+        if let Some(sky) = self.shared_sky {
+            self.keep_sky_samples(n, sky);
+        }
         any
     }
 

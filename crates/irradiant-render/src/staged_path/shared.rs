@@ -7,9 +7,12 @@ use crate::camera_samples::CameraSample;
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, survival_probability};
 use crate::shared_path::blocks::{Blocks, FirstScattering, Kind, Leaving};
-use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, Second, gains, is_shared};
+use crate::shared_path::sky::{Glimpse, SharedSky};
+use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, PIXELS, Second, gains, is_shared};
 use irradiant_core::bxdf::Bxdf;
 use irradiant_core::geometry::Hit;
+use irradiant_core::interaction::LightId;
+use irradiant_core::light::SkyPoint;
 use irradiant_core::scene::Scene;
 use irradiant_math::Vec3;
 use irradiant_math::lanes::LANES;
@@ -35,6 +38,34 @@ impl Batch {
         }
     }
 
+    /// Puts aside the light samples of the sky whose vertices share it: they do not count as samples of their own.
+    pub(super) fn keep_sky_samples(&mut self, n: usize, sky: LightId) {
+        for i in 0..n {
+            if self.pmf[i] > 0.0
+                && self.picked[i] == sky.0
+                && let Some(rgb) = self.sky.rgb(i)
+                && self.gains(i)
+            {
+                let point = SkyPoint { wi: self.targets.wi.vector(i), pdf: self.targets.pdf[i], rgb };
+                let pmf = std::mem::take(&mut self.pmf[i]);
+                self.sky_samples.push((i as u32, point, self.light_share[i], pmf));
+            }
+        }
+    }
+
+    /// Leaves in `blocks` the light samples of the sky that first vertices have drawn, and what else is needed to share it.
+    fn share_sky_samples(&mut self, sky: &SharedSky, blocks: &mut Blocks) {
+        for (i, point, share, pmf) in self.sky_samples.drain(..) {
+            let glimpse = Glimpse { point, factor: sky.factor(share, pmf), sees: false };
+            blocks.set_glimpse(self.sample[i as usize] as usize, true, glimpse);
+        }
+        self.shared_sky = None;
+        for k in 0..self.seeking.len() {
+            let i = self.seeking[k] as usize;
+            blocks.seeking[self.sample[i] as usize / PIXELS] += u32::from(self.gains(i));
+        }
+    }
+
     /// Whether light that leaves a lane's vertex is the same in all directions of one side.
     fn is_even(&self, i: usize) -> bool {
         match self.scattering[i] {
@@ -52,6 +83,7 @@ impl PathIntegrator {
         &self,
         b: &mut Batch,
         scene: &Scene,
+        sky: Option<&SharedSky>,
         samples: &mut [CameraSample],
         hits: &[Option<Hit>],
         blocks: &mut Blocks,
@@ -67,7 +99,11 @@ impl PathIntegrator {
             return;
         }
         level.run(Numbers(b, n, 0));
+        b.shared_sky = sky.map(|sky| sky.id);
         b.light_samples(n, 0, self.light_splits_at(0), scene, samples, &mut blocks.own, stats);
+        if let Some(sky) = sky {
+            b.share_sky_samples(sky, blocks);
+        }
         b.scatter(n, scene);
         for i in 0..n {
             let s = b.sample[i] as usize;
@@ -82,12 +118,13 @@ impl PathIntegrator {
                     Scattering::Alone(k) => FirstScattering::Alone(&b.bsdfs[k as usize]),
                 };
                 blocks.set_first(s, &b.at, i, b.time[i], scattering, material);
+                blocks.marks[s / PIXELS][s % PIXELS] = b.scatter.roulette(i);
                 Kind::First
             } else {
                 Kind::Apart
             };
         }
-        let n = self.leave_first(b, n, scene, blocks, stats);
+        let n = self.leave_first(b, n, scene, sky, blocks, stats);
 
         // Second vertices. What paths bring that are apart from here on is a sum of its own.
         for (s, kind) in blocks.kinds.iter().enumerate() {
@@ -121,6 +158,7 @@ impl PathIntegrator {
         b: &mut Batch,
         n: usize,
         scene: &Scene,
+        sky: Option<&SharedSky>,
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
@@ -141,6 +179,21 @@ impl PathIntegrator {
         }
         b.light_splits = self.light_splits_at(0);
         scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
+        let Some(sky) = sky else { return stay };
+        let all = std::mem::replace(&mut stay, 0);
+        for i in 0..all {
+            let s = b.sample[i] as usize;
+            if blocks.kinds[s] == Kind::First {
+                let point = sky.sky.look(b.d.vector(i), b.escape_place[i]);
+                let sees = b.met[i].is_none();
+                blocks.set_glimpse(s, false, Glimpse { point, factor: 1.0, sees });
+                if sees {
+                    continue;
+                }
+            }
+            b.shift(stay, i);
+            stay += 1;
+        }
         stay
     }
 
