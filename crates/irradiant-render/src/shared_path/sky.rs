@@ -52,10 +52,19 @@ impl<'a> SharedSky<'a> {
         share * self.times / pmf
     }
 
-    /// The density with which light samples of so many first vertices find a point together, 1/sr.
+    /// The density with which a block finds a point, 1/sr: so many light samples, and the BSDFs of its first vertices with these densities.
     #[inline(always)]
-    pub fn light_density(&self, seeking: u32, point: &SkyPoint) -> f32 {
-        seeking as f32 * self.times * point.pdf
+    pub fn density(&self, seeking: u32, point: &SkyPoint, pdfs: &[f32; PIXELS]) -> f32 {
+        // In halves, as vectors add.
+        let mut sums = *pdfs;
+        let mut half = PIXELS / 2;
+        while half > 0 {
+            for i in 0..half {
+                sums[i] += sums[i + half];
+            }
+            half /= 2;
+        }
+        seeking as f32 * self.times * point.pdf + sums[0]
     }
 }
 
@@ -134,7 +143,7 @@ pub(super) fn share_sky(scene: &Scene, sky: &SharedSky, scratch: &mut Scratch, s
     for (j, glimpse) in glimpses.iter_mut().enumerate() {
         let Some(glimpse) = glimpse else { continue };
         let wi = glimpse.point.wi;
-        let mut density = sky.light_density(*seeking, &glimpse.point);
+        let mut pdfs = [0.0; PIXELS];
         for (i, member) in members.iter().enumerate() {
             let Some(first) = &member.first else { continue };
             let (f, pdf) = first.bsdf.f_and_pdf(first.at.wo, wi, TransportMode::Radiance);
@@ -142,9 +151,9 @@ pub(super) fn share_sky(scene: &Scene, sky: &SharedSky, scratch: &mut Scratch, s
             if !(pdf > 0.0) || !pdf.is_finite() || f_cos.is_black() {
                 continue;
             }
-            scattered[j][i] = f_cos;
-            density += pdf;
+            (scattered[j][i], pdfs[i]) = (f_cos, pdf);
         }
+        let density = sky.density(*seeking, &glimpse.point, &pdfs);
         // A light sample is not tested by its own pixel until now.
         if j < PIXELS
             && let Some(own) = members[j].first.as_ref().filter(|_| !scattered[j][j].is_black())

@@ -10,7 +10,7 @@ use irradiant_core::geometry::Kernel;
 use irradiant_core::light::SkyPoint;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Ray, Vec3, offset_ray_origin};
-use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum};
+use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 
 /// A glimpse of the sky as the first vertices of its block have it.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ struct Outlook {
     wi: Three,
     /// Where the rays to it begin.
     o: Three,
-    /// What is scattered, with the cosine; and the density with which it is found, 1/sr.
+    /// What is scattered, with the cosine; and the density with which it is found, 1/sr, 0 where nothing is scattered.
     f_cos: Spectra,
     pdf: Sixteen,
     /// Not 0 where anything is.
@@ -75,7 +75,9 @@ impl Kernel for LookOut<'_> {
         }
         r.scatter(&out.wi, &mut out.f_cos, &mut out.pdf, &mut out.scatters);
         for i in 0..PIXELS {
-            out.scatters[i] &= u32::from((out.pdf[i] > 0.0) & (out.pdf[i] < f32::INFINITY));
+            let scatters = (out.scatters[i] != 0) & (out.pdf[i] > 0.0) & (out.pdf[i] < f32::INFINITY);
+            out.scatters[i] = u32::from(scatters);
+            out.pdf[i] = if scatters { out.pdf[i] } else { 0.0 };
         }
     }
 }
@@ -163,14 +165,22 @@ impl Outlooks {
             let (outlooks, marks) = (&mut self.all[..n], &mut blocks.marks[block]);
             scene.geometry.level().run(Choose { outlooks, marks, tests: sky.tests as f32 });
             self.test(scene, n, blocks.receivers[block].time, stats);
-            for i in 0..PIXELS {
-                let s = block * PIXELS + i;
-                let mut sum = SampledSpectrum::ZERO;
-                for outlook in self.all[..n].iter().filter(|outlook| outlook.inverse_chance[i] > 0.0) {
-                    let radiance = sky.sky.radiance(&outlook.glimpse.point, &samples[s].lambda);
-                    sum += spectrum(&outlook.f_cos, i) * radiance * (outlook.share * outlook.inverse_chance[i]);
+            let mut sums = [SampledSpectrum::ZERO; PIXELS];
+            for outlook in &self.all[..n] {
+                let mut known: Option<(Wavelengths, SampledSpectrum)> = None;
+                for i in (0..PIXELS).filter(|i| outlook.inverse_chance[*i] > 0.0) {
+                    let lambda = &samples[block * PIXELS + i].lambda;
+                    // In the RGB basis all have the same.
+                    let radiance = match known {
+                        Some((of, radiance)) if of == *lambda => radiance,
+                        _ => sky.sky.radiance(&outlook.glimpse.point, lambda),
+                    };
+                    known = Some((*lambda, radiance));
+                    sums[i] += spectrum(&outlook.f_cos, i) * radiance * (outlook.share * outlook.inverse_chance[i]);
                 }
-                blocks.own[s] += sum;
+            }
+            for (own, sum) in blocks.own[block * PIXELS..].iter_mut().zip(sums) {
+                *own += sum;
             }
         }
     }
@@ -186,6 +196,7 @@ impl Outlooks {
         stats: &mut RenderStats,
     ) -> usize {
         let (mut n, receivers) = (0, &blocks.receivers[block]);
+        let is_any_alone = receivers.models.iter().any(|model| matches!(model, Model::Alone(_)));
         self.rays.clear();
         for (place, glimpse) in blocks.glimpses[block].iter().enumerate() {
             let Some(glimpse) = glimpse else { continue };
@@ -195,14 +206,14 @@ impl Outlooks {
             let wi = glimpse.point.wi;
             (0..PIXELS).for_each(|i| out.wi.set(i, wi.to_array()));
             scene.geometry.level().run(LookOut { receivers, out });
-            for i in 0..PIXELS {
+            for i in (0..PIXELS).filter(|_| is_any_alone) {
                 if let Model::Alone(k) = receivers.models[i] {
                     let (bsdf, wo) = &blocks.alone[k as usize];
                     let (f, pdf) = bsdf.f_and_pdf(*wo, wi, TransportMode::Radiance);
                     let f_cos = f * bsdf.abs_cos(wi);
+                    let scatters = pdf > 0.0 && pdf.is_finite() && !f_cos.is_black();
                     set_spectrum(&mut out.f_cos, i, f_cos);
-                    out.pdf[i] = pdf;
-                    out.scatters[i] = u32::from(pdf > 0.0 && pdf.is_finite() && !f_cos.is_black());
+                    (out.pdf[i], out.scatters[i]) = if scatters { (pdf, 1) } else { (0.0, 0) };
                 }
             }
             // Light samples come first.
@@ -217,10 +228,7 @@ impl Outlooks {
             if out.is_asked {
                 out.glimpse.sees = answers.next() == Some(&false);
             }
-            let mut density = sky.light_density(blocks.seeking[block], &out.glimpse.point);
-            for i in 0..PIXELS {
-                density += if out.scatters[i] != 0 { out.pdf[i] } else { 0.0 };
-            }
+            let density = sky.density(blocks.seeking[block], &out.glimpse.point, &out.pdf);
             (out.share, out.expected) = (out.glimpse.share(density), out.glimpse.expected(density));
         }
         n
