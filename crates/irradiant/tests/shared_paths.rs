@@ -17,7 +17,7 @@ use irradiant::core::geometry::Level;
 use irradiant::renderer::shared_path::SharedPathIntegrator;
 use irradiant::renderer::{Integrator, RenderStats, WorkUnit};
 use irradiant::{ColorMode, IntegratorChoice, Job, RenderSettings, load_text, render};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Pictures by shared paths, each of other random numbers.
 const REPLICATES: u64 = 64;
@@ -172,6 +172,76 @@ fn assert_stripes_are_right(scene: &str, how: How, power: f64) {
     }
 }
 
+/// A light source: an uneven sky of 16 by 16 pixels with a sun in it.
+fn sunny() -> String {
+    static FILE: OnceLock<String> = OnceLock::new();
+    let file = FILE.get_or_init(|| {
+        let image = irradiant::image::Image::from_fn(16, 16, ["R", "G", "B"], |x, y| match (x, y) {
+            (3, 11) => [90.0, 80.0, 60.0],
+            _ => [0, 1, 2].map(|c| ((x * 111 + y * 1776 + c * 37) % 101) as f32 / 100.0),
+        });
+        let path = std::env::temp_dir().join(format!("irradiant-shared-sky-{}.exr", std::process::id()));
+        let bytes = irradiant::image::write(&image, irradiant::image::FileFormat::Exr).expect("writable");
+        std::fs::write(&path, bytes).expect("a file");
+        path.display().to_string().replace('\\', "/")
+    });
+    format!("LightSource \"infinite\" \"string filename\" \"{file}\" \"float scale\" 0.5\n")
+}
+
+/// Stripes of two materials as in [`striped`], outside, behind what hides parts of the sky.
+fn striped_outside(a: &str, b: &str) -> String {
+    let mut scene = film(8)
+        + "LookAt 0 0 0  0 0 1  0 1 0\nCamera \"perspective\" \"float fov\" 45\nWorldBegin\n"
+        + &sunny()
+        + &diffuse(0.3, 0.5, 0.6)
+        + &quad([[-0.7, 0.5, 0.3], [0.2, 0.5, 0.2], [0.1, 0.6, 0.8], [-0.8, 0.6, 0.8]])
+        + &quad([[0.5, -1.0, 0.2], [0.5, 0.1, 0.3], [0.6, 0.2, 0.8], [0.6, -1.0, 0.8]]);
+    let width = 2.0 * (2.0 * 0.99 * (22.5f32).to_radians().tan() / 8.0);
+    for i in -4..4 {
+        let x = i as f32 * width;
+        scene += if i % 2 == 0 { a } else { b };
+        scene += &quad([[x, -0.9, 0.99], [x + width, -0.9, 0.99], [x + width, 0.9, 0.99], [x, 0.9, 0.99]]);
+    }
+    scene
+}
+
+#[test]
+fn pixels_share_the_sky() {
+    let uniform = "LightSource \"infinite\" \"rgb L\" [ .5 .6 .8 ]\n";
+    let lit = all_sorts();
+    let scene = lit.replace(uniform, &sunny());
+    assert!(scene != lit);
+    assert_shared_is_right(&scene, "sharedpath", How::new(48, 41), 0.03);
+    assert_shared_is_right(&scene, "sharedpath sky=1 lights=2", How::new(48, 42).depth(2).spectral(), 0.05);
+    // Lamps aside, by all ways to pick lights.
+    for (words, seed) in [("sharedpath sky=32", 43), ("sharedpath lights=1 lightsampler=power", 44)] {
+        assert_shared_is_right(&scene, words, How::new(48, seed).depth(1), 0.03);
+    }
+}
+
+#[test]
+fn unlike_pixels_share_the_sky() {
+    let white = "Material \"diffuse\" \"rgb reflectance\" [ .8 .8 .8 ]\n";
+    let metal = "Material \"conductor\" \"float uroughness\" 0.2 \"float vroughness\" 1 \"bool remaproughness\" false \"rgb reflectance\" [ .8 .8 .8 ]\n";
+    assert_stripes_are_right(&striped_outside(metal, white), How::new(512, 51).depth(1), 0.015);
+    let band = "Material \"diffuse\" \"spectrum reflectance\" [ 400 0 598 0 600 0.9 640 0.9 642 0 800 0 ]\n";
+    assert_stripes_are_right(&striped_outside(band, white), How::new(512, 52).depth(1).spectral(), 0.03);
+    let leaf = "Material \"diffusetransmission\" \"rgb reflectance\" [ .3 .2 .1 ] \"rgb transmittance\" [ .2 .5 .2 ]\n";
+    assert_stripes_are_right(&striped_outside(leaf, white), How::new(512, 53).depth(1), 0.015);
+}
+
+#[test]
+fn sharing_the_sky_takes_noise_away() {
+    let scene = striped_outside(&diffuse(0.8, 0.8, 0.8), &diffuse(0.2, 0.4, 0.5));
+    let noise = |words: &str| {
+        let picture = estimate(&scene, How::new(64, 61).depth(1).by(choice(words)));
+        picture.variance.iter().flatten().sum::<f64>()
+    };
+    let (shared, own) = (noise("sharedpath"), noise("sharedpath sky=0"));
+    eprintln!("variance {:.2} of what it is with a sky of one's own", shared / own);
+    assert!(shared < 0.5 * own, "variance {shared} with a shared sky, {own} without");
+}
+
 #[test]
 fn pixels_whose_paths_fail_take_part_all_the_same() {
     let white = "Material \"diffuse\" \"rgb reflectance\" [ .8 .8 .8 ]\n";
@@ -291,7 +361,7 @@ fn assert_same_bits(text: &str, integrator: SharedPathIntegrator) {
         let settings = RenderSettings { color, samples_per_pixel: Some(SAMPLES), ..RenderSettings::default() };
         let mut job = Job::new(&file, &settings).unwrap_or_else(|e| panic!("{e}"));
         let alone = picture(&job, &integrator, true, i32::MAX / 2, SAMPLES);
-        assert!(integrator.max_depth == Some(0) || alone.1.shadow_rays > 1000, "nothing to compare: {:?}", alone.1);
+        assert!(integrator.max_depth == Some(0) || alone.1.shadow_rays > 500, "nothing to compare: {:?}", alone.1);
         for level in Level::available() {
             Arc::get_mut(&mut job.scene).expect("one owner").geometry.set_level(level);
             let batches = picture(&job, &integrator, false, i32::MAX / 2, SAMPLES);
@@ -367,6 +437,24 @@ fn batches_under_several_lamps() {
     let sky = "LightSource \"infinite\" \"rgb L\" [ .5 .6 .7 ]\n";
     assert_same_bits(&flat_room(sky, 2, others), lights(8));
     assert_same_bits(&flat_room(sky, 2, others), lights(3));
+}
+
+#[test]
+fn batches_under_a_shared_sky() {
+    let uniform = "LightSource \"infinite\" \"rgb L\" [ .5 .6 .8 ]\n";
+    for splits in [1, 3, 8] {
+        assert_same_bits(&flat_room(&sunny(), 2, ""), lights(splits));
+        assert_same_bits(&all_sorts().replace(uniform, &sunny()), lights(splits));
+    }
+    let white = "Material \"diffuse\" \"rgb reflectance\" [ .8 .8 .8 ]\n";
+    let leaf = "Material \"diffusetransmission\" \"rgb reflectance\" [ .3 .2 .1 ] \"rgb transmittance\" [ .2 .5 .2 ]\n";
+    let band = "Material \"diffuse\" \"spectrum reflectance\" [ 400 0 598 0 600 0.9 640 0.9 642 0 800 0 ]\n";
+    for sky_tests in [0, 1, 5, 32] {
+        let integrator = SharedPathIntegrator { sky_tests, max_depth: Some(2), ..lights(8) };
+        assert_same_bits(&striped_outside(leaf, white), integrator);
+        assert_same_bits(&striped_outside(band, white), integrator);
+        assert_same_bits(&(flat_room(&sunny(), 0, "")), integrator);
+    }
 }
 
 #[test]
