@@ -107,10 +107,10 @@ impl Integrator for PathIntegrator {
         if !self.has_stages(scene) {
             return Box::new(move |unit, tile, stats| self.render(scene, unit, tile, stats));
         }
-        let (mut paths, mut batch) = (Batch::new(scene), SampleBatch::new(scene));
+        let (mut paths, mut batch) = (Batch::new(scene), SampleBatch::new());
         Box::new(move |unit, tile, stats| {
-            batch.for_each(scene, unit, tile, stats, |samples, hits, radiance, stats| {
-                self.radiance_of_batch(&mut paths, scene, samples, hits, radiance, stats);
+            batch.for_each(scene, unit, tile, stats, |samples, begin, radiance, stats| {
+                self.radiance_of_batch(&mut paths, scene, samples, begin, radiance, stats);
             });
         })
     }

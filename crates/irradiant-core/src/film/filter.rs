@@ -2,6 +2,7 @@
 //! weight has mean 1 (Ernst et al. 2006). Weights are exactly 1 for filters without negative lobes.
 
 use irradiant_math::elementary::{exp, sin};
+use irradiant_math::lanes::{Floats, whole};
 use irradiant_math::{Point2, warp};
 use irradiant_scene::desc::{FilterDesc, FilterKind};
 use std::f32::consts::PI;
@@ -116,7 +117,7 @@ impl Filter {
     pub fn sample(&self, u: Point2) -> FilterSample {
         match self {
             Self::Box { radius } => {
-                FilterSample { offset: [radius[0] * (2.0 * u.x - 1.0), radius[1] * (2.0 * u.y - 1.0)], weight: 1.0 }
+                FilterSample { offset: [evenly(u.x, radius[0]), evenly(u.y, radius[1])], weight: 1.0 }
             }
             Self::Triangle { radius } => {
                 FilterSample { offset: [warp::tent(u.x, radius[0]), warp::tent(u.y, radius[1])], weight: 1.0 }
@@ -124,6 +125,31 @@ impl Filter {
             Self::Tabulated(profiles) => {
                 let ((x, wx), (y, wy)) = (profiles[0].sample(u.x), profiles[1].sample(u.y));
                 FilterSample { offset: [x, y], weight: wx * wy }
+            }
+        }
+    }
+
+    /// For `n` lanes offsets, in place of the numbers that draw them, and weights: those of [`Filter::sample`], to the bit. Tabulated profiles are
+    /// searched one after another.
+    #[inline(always)]
+    pub fn sample_lanes(&self, n: usize, [x, y]: &mut [Floats; 2], weight: &mut Floats) {
+        weight[whole(n)].fill(1.0);
+        match self {
+            Self::Box { radius } => {
+                for i in whole(n) {
+                    (x[i], y[i]) = (evenly(x[i], radius[0]), evenly(y[i], radius[1]));
+                }
+            }
+            Self::Triangle { radius } => {
+                for i in whole(n) {
+                    (x[i], y[i]) = (warp::tent(x[i], radius[0]), warp::tent(y[i], radius[1]));
+                }
+            }
+            Self::Tabulated(_) => {
+                for i in 0..n {
+                    let FilterSample { offset, weight: w } = self.sample(Point2::new(x[i], y[i]));
+                    (x[i], y[i], weight[i]) = (offset[0], offset[1], w);
+                }
             }
         }
     }
@@ -153,6 +179,12 @@ impl Filter {
             Self::Tabulated(profiles) => profiles[0].value(offset[0]) * profiles[1].value(offset[1]),
         }
     }
+}
+
+/// A point of [-radius, radius).
+#[inline(always)]
+fn evenly(u: f32, radius: f32) -> f32 {
+    radius * (2.0 * u - 1.0)
 }
 
 fn sinc(x: f32) -> f32 {

@@ -1,10 +1,11 @@
 //! The random numbers of many samples side by side.
 
-use super::{BLOCKS_PER_VERTEX, CAMERA_BLOCKS, CameraDraws, LightDraws, SampleStream, Source};
+use super::{BLOCKS_PER_VERTEX, CAMERA_BLOCKS, LightDraws, SampleStream, Sampler, Source};
 use irradiant_math::Point2;
 use irradiant_math::lanes::{Floats, LANES};
 use irradiant_math::sequence::owen_sobol_4d_lanes;
 use irradiant_scene::desc::Randomization;
+use std::ops::Range;
 
 /// Many samples' streams.
 #[derive(Clone, Debug)]
@@ -28,11 +29,24 @@ impl StreamLanes {
         padded_owen(stream).is_some()
     }
 
-    /// Sets a lane, if it [can hold](Self::can_hold) the stream.
+    /// Sets lanes from `i` on to samples of a pixel that follow each other, if they [can be held](Self::can_hold).
     #[inline]
-    pub fn set(&mut self, i: usize, stream: &SampleStream) {
-        if let Some((reversed_index, seed)) = padded_owen(stream) {
-            (self.reversed_index[i], self.seed[i]) = (reversed_index, seed);
+    pub fn set(&mut self, i: usize, sampler: &Sampler, pixel: [i32; 2], samples: Range<u32>) {
+        let Some(last) = samples.end.checked_sub(1).filter(|last| *last >= samples.start) else { return };
+        let ends = [samples.start, last].map(|index| padded_owen(&sampler.stream(pixel, index)));
+        let [Some((first, seed)), Some((last, last_seed))] = ends else { return };
+        // Of one seed, they follow each other in one sequence.
+        let (first, last) = (first.reverse_bits(), last.reverse_bits());
+        if seed == last_seed && last.checked_sub(first) == Some(samples.end - 1 - samples.start) {
+            for (k, index) in (first..=last).enumerate() {
+                (self.reversed_index[i + k], self.seed[i + k]) = (index.reverse_bits(), seed);
+            }
+        } else {
+            for (k, index) in samples.enumerate() {
+                if let Some((reversed_index, seed)) = padded_owen(&sampler.stream(pixel, index)) {
+                    (self.reversed_index[i + k], self.seed[i + k]) = (reversed_index, seed);
+                }
+            }
         }
     }
 
@@ -97,12 +111,6 @@ impl BlockLanes {
     #[inline(always)]
     pub fn roulette(&self, i: usize) -> f32 {
         self.0[3][i]
-    }
-
-    /// A lane of a camera's block.
-    #[inline(always)]
-    pub fn camera_draws(&self, i: usize) -> CameraDraws {
-        CameraDraws { film: self.uv(i), wavelength: self.0[2][i], time: self.0[3][i] }
     }
 
     /// A lane of a light's block.

@@ -1,7 +1,7 @@
 //! The numbers of many paths side by side, between vertices and at them.
 
 use super::kernels::{PlacesOfBounces, PlacesOfCamera, Scatter};
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::conductor::MirrorLobe;
@@ -168,6 +168,8 @@ pub(crate) struct Batch {
     pub(super) next_factor: Floats,
     /// Where on the sky's image directions lead to.
     pub(super) places: [Floats; 2],
+    /// Paths that end at their vertices.
+    ended: Vec<u32>,
 }
 
 const NO_LAMP: u32 = u32::MAX;
@@ -234,23 +236,24 @@ impl Batch {
             next_pdf: [0.0; LANES],
             next_factor: [0.0; LANES],
             places: [[0.0; LANES]; 2],
+            ended: Vec::with_capacity(LANES),
         })
     }
 
     /// Puts the camera rays of some samples into lanes, whose first hits are known. How many there are.
-    pub fn begin(&mut self, scene: &Scene, samples: &[CameraSample], hits: &[Option<Hit>]) -> usize {
+    pub fn begin(&mut self, scene: &Scene, samples: &[BatchSample], begin: &Beginnings) -> usize {
+        (self.o, self.d, self.time) = (begin.rays.o.clone(), begin.rays.d.clone(), begin.rays.time);
+        self.streams = begin.streams.clone();
         let mut n = 0;
         for (s, sample) in samples.iter().enumerate() {
-            let Some(camera_ray) = &sample.camera_ray else { continue };
-            let ray = &camera_ray.ray;
-            self.o.set(n, ray.o.to_array());
-            self.d.set(n, ray.d.to_array());
-            self.time[n] = ray.time;
-            self.streams.set(n, &sample.stream);
-            (self.throughput[n], self.roulette_scale[n]) = (SampledSpectrum::ONE, 1.0);
-            (self.met[n], self.sample[n]) = (hits[s], s as u32);
-            n += 1;
+            (self.met[s], self.sample[s]) = (begin.hits[s], s as u32);
+            if sample.camera_weight.is_some() {
+                self.shift(n, s);
+                n += 1;
+            }
         }
+        self.throughput[..n].fill(SampledSpectrum::ONE);
+        self.roulette_scale[..n].fill(1.0);
         self.escape_place[..n].fill(None);
         if let Some((_, sky)) = scene.lights.sky()
             && self.met[..n].iter().any(Option::is_none)
@@ -454,36 +457,54 @@ impl Batch {
         }
     }
 
-    /// The path at the vertex of lane `from` goes on its way in lane `to`, with what it carries now; what it meets is not known yet.
+    /// Sends paths on their ways from their vertices. `carry` says what a path carries on, by what its throughput and the scale of roulette are, or
+    /// that it ends. How many go on, whose rays are known then, but not what these meet.
     #[inline(always)]
     pub fn leave(
         &mut self,
-        to: usize,
-        from: usize,
-        turn: &Turn,
-        throughput: SampledSpectrum,
-        roulette_scale: f32,
+        mut n: usize,
         scene: &Scene,
-    ) {
-        let [p, p_error, n, ns] = &mut self.previous;
-        p.set(to, self.at.p.point(from).to_array());
-        p_error.set(to, self.at.p_error.vector(from).to_array());
-        n.set(to, self.at.n.normal(from).to_array());
-        ns.set(to, self.at.ns.normal(from).to_array());
-        (self.bsdf_pdf[to], self.specular[to]) = (turn.pdf, turn.specular);
-        (self.throughput[to], self.roulette_scale[to]) = (throughput, roulette_scale);
-        let ray = Ray::new(turn.o, turn.wi, self.time[from]);
-        self.o.set(to, ray.o.to_array());
-        self.d.set(to, ray.d.to_array());
-        (self.time[to], self.rays[to]) = (ray.time, ray);
-        self.streams.shift(to, from);
-        self.sample[to] = self.sample[from];
-        self.escape_place[to] = match self.scattering[from] {
-            Scattering::Alone(_) => scene.lights.place_of_escape(turn.wi),
-            Scattering::Diffuse | Scattering::Metal | Scattering::Gone => {
-                scene.lights.sky().map(|(_, sky)| self.place(from, sky))
+        mut carry: impl FnMut(&Self, usize, &Turn) -> Option<(SampledSpectrum, f32)>,
+    ) -> usize {
+        let sky = scene.lights.sky();
+        let mut ended = std::mem::take(&mut self.ended);
+        ended.clear();
+        for i in 0..n {
+            let going = self.turn(i).and_then(|turn| carry(self, i, &turn).map(|carried| (turn, carried)));
+            let Some((turn, carried)) = going else {
+                ended.push(i as u32);
+                continue;
+            };
+            (self.throughput[i], self.roulette_scale[i]) = carried;
+            self.specular[i] = turn.specular;
+            let is_alone = matches!(self.scattering[i], Scattering::Alone(_));
+            if is_alone {
+                self.next_o.set(i, turn.o.to_array());
+                self.next_d.set(i, turn.wi.to_array());
+                self.next_pdf[i] = turn.pdf;
             }
-        };
+            if let Some((_, sky)) = sky {
+                let place = if is_alone { scene.lights.place_of_escape(turn.wi) } else { Some(self.place(i, sky)) };
+                self.escape_place[i] = place;
+            }
+        }
+        // All at once; few lanes move.
+        let SurfaceLanes { p, p_error, n: normal, ns, .. } = &self.at;
+        for (previous, here) in self.previous.iter_mut().zip([p, p_error, normal, ns]) {
+            previous.clone_from(here);
+        }
+        self.o.clone_from(&self.next_o);
+        self.d.clone_from(&self.next_d);
+        self.bsdf_pdf = self.next_pdf;
+        for &i in ended.iter().rev() {
+            n -= 1;
+            self.shift(i as usize, n);
+        }
+        self.ended = ended;
+        for i in 0..n {
+            self.rays[i] = self.ray(i);
+        }
+        n
     }
 }
 

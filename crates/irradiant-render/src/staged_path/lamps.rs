@@ -2,7 +2,7 @@
 
 use super::batch::{Batch, MetLamp, Scattering};
 use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::{all_are_sampled, direct_light, samples_by_chance, strata};
 use crate::path::power_heuristic;
@@ -72,7 +72,7 @@ impl Batch {
         depth: u32,
         splits: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
@@ -92,7 +92,7 @@ impl Batch {
         n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> bool {
@@ -141,7 +141,7 @@ impl Batch {
     }
 
     /// Points of those lamps that have lanes; the others are put down to be asked alone. Whether there are any.
-    fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[CameraSample]) -> bool {
+    fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[BatchSample]) -> bool {
         let sky = scene.lights.sky();
         self.light_alone.clear();
         let (mut any_rectangle, mut any_sphere) = (false, false);
@@ -206,7 +206,7 @@ impl Batch {
         n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> bool {

@@ -3,13 +3,12 @@
 
 use super::batch::{Batch, Scattering, Surface};
 use super::kernels::Numbers;
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, survival_probability};
 use crate::shared_path::blocks::{Blocks, FirstScattering, Kind, Leaving};
 use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, Second, gains, is_shared};
 use irradiant_core::bxdf::Bxdf;
-use irradiant_core::geometry::Hit;
 use irradiant_core::scene::Scene;
 use irradiant_math::Vec3;
 use irradiant_math::lanes::LANES;
@@ -52,8 +51,8 @@ impl PathIntegrator {
         &self,
         b: &mut Batch,
         scene: &Scene,
-        samples: &mut [CameraSample],
-        hits: &[Option<Hit>],
+        samples: &mut [BatchSample],
+        begin: Beginnings,
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
@@ -61,7 +60,7 @@ impl PathIntegrator {
         blocks.begin(samples.len());
 
         // First vertices.
-        let n = b.begin(scene, samples, hits);
+        let n = b.begin(scene, samples, &begin);
         let n = self.meet(b, n, 0, scene, samples, &mut blocks.own, stats);
         if self.is_at_limit(0) || n == 0 {
             return;
@@ -124,24 +123,21 @@ impl PathIntegrator {
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
-        let mut stay = 0;
-        for i in 0..n {
-            let Some(turn) = b.turn(i) else { continue };
+        let n = b.leave(n, scene, |b, i, turn| {
             let s = b.sample[i] as usize;
             let (throughput, scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(1);
             // What is of no use to its own pixel is of use to others. Roulette ends no path here.
             if throughput.is_black() && blocks.kinds[s] == Kind::Apart {
-                continue;
+                return None;
             }
             stats.bounce_rays += 1;
-            b.leave(stay, i, &turn, throughput, scale, scene);
-            stay += 1;
-        }
+            Some((throughput, scale))
+        });
         b.light_splits = self.light_splits_at(0);
-        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
-        stay
+        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        n
     }
 
     /// Notes second vertices that can be shared, and from there counts light as it leaves them.
@@ -184,7 +180,7 @@ impl PathIntegrator {
         b: &mut Batch,
         n: usize,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
@@ -237,13 +233,11 @@ impl PathIntegrator {
         b: &mut Batch,
         n: usize,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
-        let mut stay = 0;
-        for i in 0..n {
-            let Some(turn) = b.turn(i) else { continue };
+        let n = b.leave(n, scene, |b, i, turn| {
             let s = b.sample[i] as usize;
             let (mut throughput, mut scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
@@ -253,29 +247,28 @@ impl PathIntegrator {
                 scale *= throughput.max_component().max(LEAST_IMPORTANCE);
                 let survival = survival_probability(&SampledSpectrum::splat(scale), 1.0, 2);
                 if b.scatter.roulette(i) >= survival {
-                    continue;
+                    return None;
                 }
                 throughput = SampledSpectrum::splat(1.0 / survival);
                 blocks.next[s] = Some(turn.wi);
             } else {
                 if throughput.is_black() {
-                    continue;
+                    return None;
                 }
                 let survival = survival_probability(&throughput, scale, 2);
                 if survival < 1.0 {
                     if b.scatter.roulette(i) >= survival {
-                        continue;
+                        return None;
                     }
                     throughput *= 1.0 / survival;
                 }
             }
             stats.bounce_rays += 1;
-            b.leave(stay, i, &turn, throughput, scale, scene);
-            stay += 1;
-        }
+            Some((throughput, scale))
+        });
         b.light_splits = 1;
-        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
-        for i in 0..stay {
+        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        for i in 0..n {
             let s = b.sample[i] as usize;
             if blocks.kinds[s] == Kind::By {
                 // As in `SharedPathIntegrator::incoming`: first with any density of the direction, then with none.
@@ -284,11 +277,11 @@ impl PathIntegrator {
                 b.bsdf_pdf[i] = 0.0;
             }
         }
-        stay
+        n
     }
 
     /// What the ray of a lane sees of lamps that light samples find too.
-    fn lamps_seen(&self, b: &mut Batch, i: usize, scene: &Scene, sample: &CameraSample, wi: Vec3, blocks: &mut Blocks) {
+    fn lamps_seen(&self, b: &mut Batch, i: usize, scene: &Scene, sample: &BatchSample, wi: Vec3, blocks: &mut Blocks) {
         let s = b.sample[i];
         let mut lamps = Lamps(wi, |light| blocks.incoming.push((s, light)));
         let Some(hit) = b.met[i] else {

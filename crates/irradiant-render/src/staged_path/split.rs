@@ -1,7 +1,7 @@
 //! Several light samples at a vertex, as [`split_light`](crate::light_samples) takes them: the first of all paths, then the second of all.
 
 use super::batch::Batch;
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::{all_are_sampled, samples_by_chance};
 use irradiant_core::interaction::LightId;
@@ -18,7 +18,7 @@ impl Batch {
         depth: u32,
         splits: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
