@@ -4,7 +4,6 @@ use super::kernels::{PlacesOfBounces, PlacesOfCamera, Scatter};
 use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::conductor::MirrorLobe;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
 use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
@@ -15,8 +14,7 @@ use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
 use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
-use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
-use std::f32::consts::FRAC_1_PI;
+use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 
 /// How a path's vertex scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +79,35 @@ pub(super) fn nowhere() -> TextureContext {
     TextureContext::without_footprint(Point3::ZERO, Normal3::ZERO, Point2::ZERO, 0)
 }
 
+/// A spectrum each, an array for each of its lanes.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct SpectrumLanes(pub [Floats; N_WAVELENGTHS]);
+
+impl SpectrumLanes {
+    const ZERO: Self = Self([[0.0; LANES]; N_WAVELENGTHS]);
+
+    /// Of a path.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> SampledSpectrum {
+        let [a, b, c, d] = &self.0;
+        SampledSpectrum([a[i], b[i], c[i], d[i]])
+    }
+
+    /// Sets that of a path.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, spectrum: SampledSpectrum) {
+        let [a, b, c, d] = &mut self.0;
+        [a[i], b[i], c[i], d[i]] = spectrum.0;
+    }
+
+    /// That of lane `from` goes to lane `to`.
+    #[inline(always)]
+    pub fn shift(&mut self, to: usize, from: usize) {
+        self.set(to, self.at(from));
+    }
+}
+
 /// What the paths of a batch carry, side by side.
 #[repr(C, align(64))]
 pub(crate) struct Batch {
@@ -94,7 +121,7 @@ pub(crate) struct Batch {
     pub(super) specular: [bool; LANES],
     /// Strata of the choice of a light at the last vertex, the same for all.
     pub(super) light_splits: u32,
-    pub(super) throughput: [SampledSpectrum; LANES],
+    pub(super) throughput: SpectrumLanes,
     pub(super) roulette_scale: Floats,
     /// Rays to the next vertices.
     pub(super) rays: [Ray; LANES],
@@ -110,12 +137,12 @@ pub(crate) struct Batch {
     pub(super) triangles: TriangleLanes,
     pub(super) at: SurfaceLanes,
     pub(super) scattering: [Scattering; LANES],
-    pub(super) reflectance: [SampledSpectrum; LANES],
-    pub(super) metals: [Conductor; LANES],
+    pub(super) reflectance: SpectrumLanes,
+    /// The indices of metals.
+    pub(super) eta: SpectrumLanes,
+    pub(super) k: SpectrumLanes,
     pub(super) is_metal: [u32; LANES],
     pub(super) alphas: [Floats; 2],
-    /// Of the last directions asked for: cosine with the facet, value, density.
-    pub(super) lobes: [Floats; 3],
     pub(super) bsdfs: Vec<Bsdf>,
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
@@ -138,15 +165,15 @@ pub(crate) struct Batch {
     pub(super) sky: SkyLanes,
     pub(super) targets: TargetLanes,
     pub(super) is_delta: [u32; LANES],
-    pub(super) arriving: [SampledSpectrum; LANES],
+    pub(super) arriving: SpectrumLanes,
     /// The chance with which the light was picked; 0 where none is sampled.
     pub(super) pmf: Floats,
     /// How often the light is sampled at the vertex on average, and the share of all samples that this one stands for.
     pub(super) light_times: Floats,
     pub(super) light_share: Floats,
-    /// The cosine where it is scattered, and the weight of the sample over its density.
-    pub(super) light_cosine: Floats,
-    pub(super) light_factor: Floats,
+    /// What the light brings to the sample, but for what is in the way, and whether it is to be counted: of diffuse surfaces and metals.
+    pub(super) brought: SpectrumLanes,
+    pub(super) brings: [u32; LANES],
     /// Paths whose light samples are drawn alone, and their way to the sky.
     pub(super) light_alone: Vec<(u32, Option<PixelLine>)>,
     pub(super) light_runs: Vec<Option<PixelRun>>,
@@ -164,8 +191,9 @@ pub(crate) struct Batch {
     pub(super) next_o: Triples,
     pub(super) next_d: Triples,
     pub(super) next_pdf: Floats,
-    /// cos / pdf; negative where nothing is scattered.
-    pub(super) next_factor: Floats,
+    /// f cos / pdf, and whether anything is scattered.
+    pub(super) next_weight: SpectrumLanes,
+    pub(super) goes_on: [u32; LANES],
     /// Where on the sky's image directions lead to.
     pub(super) places: [Floats; 2],
     /// Paths that end at their vertices.
@@ -186,7 +214,7 @@ impl Batch {
             bsdf_pdf: [0.0; LANES],
             specular: [false; LANES],
             light_splits: 1,
-            throughput: [SampledSpectrum::ZERO; LANES],
+            throughput: SpectrumLanes::ZERO,
             roulette_scale: [0.0; LANES],
             rays: [Ray::new(Point3::ZERO, Vec3::Z, 0.0); LANES],
             met: [None; LANES],
@@ -197,11 +225,11 @@ impl Batch {
             triangles: TriangleLanes::NONE,
             at: SurfaceLanes::ZERO,
             scattering: [Scattering::Gone; LANES],
-            reflectance: [SampledSpectrum::ZERO; LANES],
-            metals: [Conductor::new(SampledSpectrum::ONE, SampledSpectrum::ONE, Ggx::SMOOTH); LANES],
+            reflectance: SpectrumLanes::ZERO,
+            eta: SpectrumLanes::ZERO,
+            k: SpectrumLanes::ZERO,
             is_metal: [0; LANES],
             alphas: [[1.0; LANES]; 2],
-            lobes: [[0.0; LANES]; 3],
             bsdfs: Vec::new(),
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
@@ -217,12 +245,12 @@ impl Batch {
             sky: SkyLanes::NONE,
             targets: TargetLanes::NONE,
             is_delta: [0; LANES],
-            arriving: [SampledSpectrum::ZERO; LANES],
+            arriving: SpectrumLanes::ZERO,
             pmf: [0.0; LANES],
             light_times: [0.0; LANES],
             light_share: [0.0; LANES],
-            light_cosine: [0.0; LANES],
-            light_factor: [0.0; LANES],
+            brought: SpectrumLanes::ZERO,
+            brings: [0; LANES],
             light_alone: Vec::new(),
             light_runs: Vec::new(),
             light_picks: Vec::new(),
@@ -234,7 +262,8 @@ impl Batch {
             next_o: Triples::ZERO,
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
-            next_factor: [0.0; LANES],
+            next_weight: SpectrumLanes::ZERO,
+            goes_on: [0; LANES],
             places: [[0.0; LANES]; 2],
             ended: Vec::with_capacity(LANES),
         })
@@ -242,8 +271,10 @@ impl Batch {
 
     /// Puts the camera rays of some samples into lanes, whose first hits are known. How many there are.
     pub fn begin(&mut self, scene: &Scene, samples: &[BatchSample], begin: &Beginnings) -> usize {
-        (self.o, self.d, self.time) = (begin.rays.o.clone(), begin.rays.d.clone(), begin.rays.time);
-        self.streams = begin.streams.clone();
+        self.o.copy(samples.len(), &begin.rays.o);
+        self.d.copy(samples.len(), &begin.rays.d);
+        self.time = begin.rays.time;
+        self.streams.clone_from(begin.streams);
         let mut n = 0;
         for (s, sample) in samples.iter().enumerate() {
             (self.met[s], self.sample[s]) = (begin.hits[s], s as u32);
@@ -252,7 +283,7 @@ impl Batch {
                 n += 1;
             }
         }
-        self.throughput[..n].fill(SampledSpectrum::ONE);
+        self.throughput.0.iter_mut().for_each(|lane| lane[..n].fill(1.0));
         self.roulette_scale[..n].fill(1.0);
         self.escape_place[..n].fill(None);
         if let Some((_, sky)) = scene.lights.sky()
@@ -293,7 +324,7 @@ impl Batch {
             }
         });
         Walk {
-            throughput: self.throughput[i],
+            throughput: self.throughput.at(i),
             depth,
             roulette_scale: self.roulette_scale[i],
             previous,
@@ -317,7 +348,7 @@ impl Batch {
         self.previous.iter_mut().for_each(|t| t.shift(to, from));
         self.bsdf_pdf[to] = self.bsdf_pdf[from];
         self.specular[to] = self.specular[from];
-        self.throughput[to] = self.throughput[from];
+        self.throughput.shift(to, from);
         self.roulette_scale[to] = self.roulette_scale[from];
         self.met[to] = self.met[from];
         self.escape_place[to] = self.escape_place[from];
@@ -349,28 +380,40 @@ impl Batch {
         self.is_metal[first..first + WHOLE].iter().fold(0, |any, metal| any | metal) != 0
     }
 
+    /// What light from a lane's sample brings, where the surface scatters `f` of it and finds its direction with the density `pdf`; and whether
+    /// it is to be counted.
     #[inline(always)]
-    pub fn set_lobe(&mut self, i: usize, lobe: &MirrorLobe) {
-        (self.lobes[0][i], self.lobes[1][i], self.lobes[2][i]) = (lobe.cos, lobe.value, lobe.pdf);
+    pub fn bring(&self, i: usize, f: SampledSpectrum, pdf: f32) -> (SampledSpectrum, bool) {
+        let light = self.throughput.at(i) * f * self.arriving.at(i) * self.light_weight(i, pdf);
+        (light, !f.is_black() & !self.arriving.at(i).is_black() & f.is_finite())
     }
 
-    /// What a lane's metal scatters in the direction last asked for, without cosine.
-    #[inline]
-    pub fn metal_f(&self, i: usize) -> SampledSpectrum {
-        self.metals[i].fresnel(self.lobes[0][i]) * self.lobes[1][i]
+    /// A lane's metal.
+    #[inline(always)]
+    pub fn metal(&self, i: usize) -> Conductor {
+        Conductor::new(self.eta.at(i), self.k.at(i), self.facets(i))
+    }
+
+    /// Its facets.
+    #[inline(always)]
+    pub fn facets(&self, i: usize) -> Ggx {
+        Ggx::new(self.alphas[0][i], self.alphas[1][i])
     }
 
     /// Makes a lane's surface scatter so.
     #[inline(always)]
     pub fn set_metal(&mut self, i: usize, metal: Conductor) {
         let [x, y] = metal.facets().alphas();
-        (self.metals[i], self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (metal, 1, x, y);
+        let (eta, k) = metal.index();
+        self.eta.set(i, eta);
+        self.k.set(i, k);
+        (self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (1, x, y);
         self.scattering[i] = Scattering::Metal;
     }
 
     #[inline(always)]
     pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
-        self.reflectance[i] = reflectance;
+        self.reflectance.set(i, reflectance);
         self.scattering[i] = Scattering::Diffuse;
     }
 
@@ -396,9 +439,9 @@ impl Batch {
     pub fn bsdf(&self, i: usize) -> Bsdf {
         match self.scattering[i] {
             Scattering::Alone(k) => self.bsdfs[k as usize],
-            Scattering::Metal => Bsdf::new(self.at.frame(i), Bxdf::Conductor(self.metals[i])),
+            Scattering::Metal => Bsdf::new(self.at.frame(i), Bxdf::Conductor(self.metal(i))),
             Scattering::Diffuse | Scattering::Gone => {
-                Bsdf::new(self.at.frame(i), Bxdf::Diffuse(Diffuse::new(self.reflectance[i])))
+                Bsdf::new(self.at.frame(i), Bxdf::Diffuse(Diffuse::new(self.reflectance.at(i))))
             }
         }
     }
@@ -425,17 +468,7 @@ impl Batch {
         };
         match self.scattering[i] {
             Scattering::Gone => None,
-            Scattering::Diffuse => {
-                let f = self.reflectance[i] * FRAC_1_PI;
-                (!(f.is_black() || self.next_factor[i] < 0.0)).then(|| plain(f * self.next_factor[i]))
-            }
-            Scattering::Metal => {
-                if self.next_factor[i] < 0.0 {
-                    return None;
-                }
-                let f = self.metal_f(i);
-                (!f.is_black() && f.is_finite()).then(|| plain(f * self.next_factor[i]))
-            }
+            Scattering::Diffuse | Scattering::Metal => (self.goes_on[i] != 0).then(|| plain(self.next_weight.at(i))),
             Scattering::Alone(k) => {
                 let (bsdf, wo) = (&self.bsdfs[k as usize], self.at.wo.vector(i));
                 let [_, _, lobe, _] = &self.scatter.0;
@@ -475,7 +508,8 @@ impl Batch {
                 ended.push(i as u32);
                 continue;
             };
-            (self.throughput[i], self.roulette_scale[i]) = carried;
+            self.throughput.set(i, carried.0);
+            self.roulette_scale[i] = carried.1;
             self.specular[i] = turn.specular;
             let is_alone = matches!(self.scattering[i], Scattering::Alone(_));
             if is_alone {
@@ -491,11 +525,11 @@ impl Batch {
         // All at once; few lanes move.
         let SurfaceLanes { p, p_error, n: normal, ns, .. } = &self.at;
         for (previous, here) in self.previous.iter_mut().zip([p, p_error, normal, ns]) {
-            previous.clone_from(here);
+            previous.copy(n, here);
         }
-        self.o.clone_from(&self.next_o);
-        self.d.clone_from(&self.next_d);
-        self.bsdf_pdf = self.next_pdf;
+        self.o.copy(n, &self.next_o);
+        self.d.copy(n, &self.next_d);
+        self.bsdf_pdf[..n].copy_from_slice(&self.next_pdf[..n]);
         for &i in ended.iter().rev() {
             n -= 1;
             self.shift(i as usize, n);

@@ -16,7 +16,6 @@ use irradiant_core::scene::Scene;
 use irradiant_math::Point2;
 use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
-use std::f32::consts::FRAC_1_PI;
 
 /// All of [`Compensated`](SampleMode::Compensated): hits are weighed against samples.
 const MODE: SampleMode = SampleMode::Compensated;
@@ -61,7 +60,7 @@ impl Batch {
                 }
             }
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
-            radiance[self.sample[i] as usize] += self.throughput[i] * met.emitted * weight;
+            radiance[self.sample[i] as usize] += self.throughput.at(i) * met.emitted * weight;
         }
     }
 
@@ -119,8 +118,8 @@ impl Batch {
                 sampler.sample_lanes(level, &self.seeking, at, pick, tree, &mut self.picked, &mut self.pmf);
             }
         }
-        self.light_times = self.pmf;
-        self.light_share = [1.0; LANES];
+        self.light_times[..n].copy_from_slice(&self.pmf[..n]);
+        self.light_share[..n].fill(1.0);
     }
 
     /// Paths whose surfaces scatter light that it is not known where to look for; no light is picked yet.
@@ -129,7 +128,7 @@ impl Batch {
         for i in 0..n {
             self.pmf[i] = 0.0;
             let scatters = match self.scattering[i] {
-                Scattering::Diffuse => !self.reflectance[i].is_black(),
+                Scattering::Diffuse => !self.reflectance.at(i).is_black(),
                 Scattering::Metal => true,
                 Scattering::Alone(k) => self.bsdfs[k as usize].flags().is_non_specular(),
                 Scattering::Gone => false,
@@ -180,7 +179,8 @@ impl Batch {
                     | EmitterShape::Curve(_) => false,
                 };
                 if has_lanes {
-                    self.arriving[i] = emission.sample(&samples[self.sample[i] as usize].lambda) * lamp.scale * alpha;
+                    self.arriving
+                        .set(i, emission.sample(&samples[self.sample[i] as usize].lambda) * lamp.scale * alpha);
                     (self.is_delta[i], self.two_sided[i]) = (0, u32::from(lamp.two_sided));
                     continue;
                 }
@@ -226,7 +226,8 @@ impl Batch {
             let light = scene.lights.get(LightId(self.picked[i]));
             if let (Some(run), Some((_, sky))) = (run, sky) {
                 if let Some(radiance) = self.sky.arrive(i, sky, run, lambda, MODE) {
-                    (self.arriving[i], self.is_delta[i]) = (radiance, 0);
+                    self.arriving.set(i, radiance);
+                    self.is_delta[i] = 0;
                     any_sky = true;
                 } else {
                     self.pmf[i] = 0.0;
@@ -243,7 +244,7 @@ impl Batch {
                 self.pmf[i] = 0.0;
                 continue;
             };
-            self.arriving[i] = sample.radiance * scene.opacity(&sample);
+            self.arriving.set(i, sample.radiance * scene.opacity(&sample));
             self.targets.set(i, &sample);
             self.is_delta[i] = u32::from(sample.is_delta);
             any = true;
@@ -268,7 +269,7 @@ impl Batch {
             scene,
             &self.interaction(i),
             &self.bsdf(i),
-            &self.throughput[i],
+            &self.throughput.at(i),
             lambda,
             &self.light.light_draws(i),
             None,
@@ -295,25 +296,22 @@ impl Batch {
             if self.pmf[i] == 0.0 || self.targets.pdf[i] == 0.0 {
                 continue;
             }
-            let (f, factor) = match self.scattering[i] {
-                Scattering::Diffuse => (self.reflectance[i] * FRAC_1_PI, self.light_factor[i]),
-                Scattering::Metal => (self.metal_f(i), self.light_factor[i]),
+            let (light, counts) = match self.scattering[i] {
+                Scattering::Diffuse | Scattering::Metal => (self.brought.at(i), self.brings[i] != 0),
                 Scattering::Alone(k) => {
                     let (bsdf, wi) = (&self.bsdfs[k as usize], self.targets.wi.vector(i));
                     let (f, pdf) = bsdf.f_and_pdf(self.at.wo.vector(i), wi, TransportMode::Radiance);
-                    self.light_cosine[i] = wi.dot(bsdf.frame.z).abs();
-                    (f, self.light_weight(i, pdf))
+                    self.bring(i, f * wi.dot(bsdf.frame.z).abs(), pdf)
                 }
                 Scattering::Gone => continue,
             };
-            let f = f * self.light_cosine[i];
-            if f.is_black() || self.arriving[i].is_black() || !f.is_finite() {
+            if !counts {
                 continue;
             }
             let (ray, end) = self.targets.ray(i, self.time[i]);
             self.shadow_rays.push(ray);
             self.shadow_ends.push(end);
-            self.shadow_light.push((self.sample[i], self.throughput[i] * f * self.arriving[i] * factor));
+            self.shadow_light.push((self.sample[i], light));
         }
         stats.shadow_rays += self.shadow_rays.len() as u64;
         let mut occluded = [false; LANES];

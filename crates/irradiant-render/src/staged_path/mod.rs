@@ -251,7 +251,7 @@ impl PathIntegrator {
     /// Plays roulette and traces the rays of paths that go on, `depth` scattering events by then. How many do.
     fn go_on(&self, b: &mut Batch, n: usize, depth: u32, scene: &Scene, stats: &mut RenderStats) -> usize {
         let n = b.leave(n, scene, |b, i, turn| {
-            let mut throughput = b.throughput[i] * turn.weight;
+            let mut throughput = b.throughput.at(i) * turn.weight;
             let roulette_scale = b.roulette_scale[i] * turn.scale;
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(depth);

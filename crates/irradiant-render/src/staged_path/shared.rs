@@ -28,7 +28,7 @@ impl Batch {
     fn gains(&self, i: usize) -> bool {
         match self.scattering[i] {
             Scattering::Diffuse => true,
-            Scattering::Metal => !(self.metals[i].alpha() < LEAST_ALPHA),
+            Scattering::Metal => !(self.metal(i).alpha() < LEAST_ALPHA),
             Scattering::Alone(k) => gains(&self.bsdfs[k as usize]),
             Scattering::Gone => false,
         }
@@ -75,9 +75,10 @@ impl PathIntegrator {
                     Surface::Flat(material, _) => Some(material),
                     Surface::Other => None,
                 };
+                let metal = b.metal(i);
                 let scattering = match b.scattering[i] {
-                    Scattering::Diffuse | Scattering::Gone => FirstScattering::Diffuse(b.reflectance[i]),
-                    Scattering::Metal => FirstScattering::Metal(&b.metals[i]),
+                    Scattering::Diffuse | Scattering::Gone => FirstScattering::Diffuse(b.reflectance.at(i)),
+                    Scattering::Metal => FirstScattering::Metal(&metal),
                     Scattering::Alone(k) => FirstScattering::Alone(&b.bsdfs[k as usize]),
                 };
                 blocks.set_first(s, &b.at, i, b.time[i], scattering, material);
@@ -125,7 +126,7 @@ impl PathIntegrator {
     ) -> usize {
         let n = b.leave(n, scene, |b, i, turn| {
             let s = b.sample[i] as usize;
-            let (throughput, scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
+            let (throughput, scale) = (b.throughput.at(i) * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(1);
             // What is of no use to its own pixel is of use to others. Roulette ends no path here.
@@ -147,7 +148,7 @@ impl PathIntegrator {
             if blocks.kinds[s] != Kind::First || b.scattering[i] == Scattering::Gone {
                 continue;
             }
-            let carried = b.throughput[i];
+            let carried = b.throughput.at(i);
             if !b.is_shared(i) {
                 blocks.kinds[s] = Kind::Own;
                 if carried.is_black() {
@@ -156,7 +157,7 @@ impl PathIntegrator {
                 continue;
             }
             b.roulette_scale[i] = carried.max_component().max(LEAST_IMPORTANCE);
-            b.throughput[i] = SampledSpectrum::ONE;
+            b.throughput.set(i, SampledSpectrum::ONE);
             let wo = b.at.wo.vector(i);
             let light = if b.is_even(i) {
                 blocks.kinds[s] = Kind::Evenly;
@@ -197,7 +198,7 @@ impl PathIntegrator {
                 continue;
             }
             let pmf = std::mem::take(&mut b.pmf[i]);
-            if pmf == 0.0 || b.targets.pdf[i] == 0.0 || b.arriving[i].is_black() {
+            if pmf == 0.0 || b.targets.pdf[i] == 0.0 || b.arriving.at(i).is_black() {
                 continue;
             }
             let (ray, end) = b.targets.ray(i, b.time[i]);
@@ -205,7 +206,7 @@ impl PathIntegrator {
             b.shadow_ends.push(end);
             let incoming = Incoming {
                 wi: b.targets.wi.vector(i),
-                radiance: b.arriving[i],
+                radiance: b.arriving.at(i),
                 light_pdf: pmf * b.targets.pdf[i],
                 found_by_bsdf: b.is_delta[i] == 0,
             };
@@ -239,7 +240,7 @@ impl PathIntegrator {
     ) -> usize {
         let n = b.leave(n, scene, |b, i, turn| {
             let s = b.sample[i] as usize;
-            let (mut throughput, mut scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
+            let (mut throughput, mut scale) = (b.throughput.at(i) * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(2);
             if blocks.kinds[s] == Kind::By {
