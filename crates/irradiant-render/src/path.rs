@@ -566,7 +566,7 @@ const ROULETTE_BELOW: f32 = 0.5;
 
 /// Chance to go on: the largest throughput, with the scale of [`Walk`] for roulette, over [`ROULETTE_BELOW`]; 1 for the first two
 /// events.
-#[inline]
+#[inline(always)]
 pub(crate) fn survival_probability(throughput: &SampledSpectrum, roulette_scale: f32, depth: u32) -> f32 {
     if depth <= 1 {
         return 1.0;

@@ -196,8 +196,8 @@ pub(crate) struct Batch {
     pub(super) goes_on: [u32; LANES],
     /// Where on the sky's image directions lead to.
     pub(super) places: [Floats; 2],
-    /// Paths that end at their vertices.
-    ended: Vec<u32>,
+    /// What the scale of roulette is multiplied with.
+    pub(super) next_scale: Floats,
 }
 
 const NO_LAMP: u32 = u32::MAX;
@@ -265,7 +265,7 @@ impl Batch {
             next_weight: SpectrumLanes::ZERO,
             goes_on: [0; LANES],
             places: [[0.0; LANES]; 2],
-            ended: Vec::with_capacity(LANES),
+            next_scale: [1.0; LANES],
         })
     }
 
@@ -446,82 +446,74 @@ impl Batch {
         }
     }
 
-    /// Draws directions in lanes, and the rays that go there.
+    /// Draws directions, and the rays that go there.
     pub fn scatter(&mut self, n: usize, scene: &Scene) {
         let level = scene.geometry.level();
         level.run(Scatter(self, n));
+        self.next_scale[..n].fill(1.0);
+        self.specular[..n].fill(false);
+        for i in 0..n {
+            match self.scattering[i] {
+                Scattering::Diffuse | Scattering::Metal => {}
+                Scattering::Alone(k) => self.goes_on[i] = u32::from(self.scatter_alone(i, k as usize)),
+                Scattering::Gone => self.goes_on[i] = 0,
+            }
+        }
         if let Some((_, sky)) = scene.lights.sky() {
             level.run(PlacesOfBounces(self, n, sky));
         }
     }
 
-    /// The direction that a lane's path takes, if there is one: drawn in lanes where the vertex is plain.
-    #[inline(always)]
-    pub fn turn(&self, i: usize) -> Option<Turn> {
-        let plain = |weight: SampledSpectrum| Turn {
-            weight,
-            scale: 1.0,
-            wi: self.next_d.vector(i),
-            o: self.next_o.point(i),
-            pdf: self.next_pdf[i],
-            specular: false,
+    /// Draws the direction of a model of its own. Whether there is one.
+    fn scatter_alone(&mut self, i: usize, k: usize) -> bool {
+        let (bsdf, wo) = (&self.bsdfs[k], self.at.wo.vector(i));
+        let [_, _, lobe, _] = &self.scatter.0;
+        let sample = bsdf.sample(wo, lobe[i], self.scatter.uv(i), TransportMode::Radiance, Sides::All);
+        let Some(sample) = sample else { return false };
+        let (wi, specular) = (sample.wi, sample.lobe.is_specular());
+        self.next_weight.set(i, sample.f * (wi.dot(bsdf.frame.z).abs() / sample.pdf));
+        self.next_scale[i] = if sample.lobe.is_transmissive() { sample.eta * sample.eta } else { 1.0 };
+        self.next_pdf[i] = if sample.pdf_is_proportional && !specular {
+            bsdf.pdf(wo, wi, TransportMode::Radiance, Sides::All)
+        } else {
+            sample.pdf
         };
-        match self.scattering[i] {
-            Scattering::Gone => None,
-            Scattering::Diffuse | Scattering::Metal => (self.goes_on[i] != 0).then(|| plain(self.next_weight.at(i))),
-            Scattering::Alone(k) => {
-                let (bsdf, wo) = (&self.bsdfs[k as usize], self.at.wo.vector(i));
-                let [_, _, lobe, _] = &self.scatter.0;
-                let sample = bsdf.sample(wo, lobe[i], self.scatter.uv(i), TransportMode::Radiance, Sides::All)?;
-                let (wi, specular) = (sample.wi, sample.lobe.is_specular());
-                Some(Turn {
-                    weight: sample.f * (wi.dot(bsdf.frame.z).abs() / sample.pdf),
-                    scale: if sample.lobe.is_transmissive() { sample.eta * sample.eta } else { 1.0 },
-                    wi,
-                    o: offset_ray_origin(self.at.p.point(i), self.at.p_error.vector(i), self.at.n.normal(i), wi),
-                    pdf: if sample.pdf_is_proportional && !specular {
-                        bsdf.pdf(wo, wi, TransportMode::Radiance, Sides::All)
-                    } else {
-                        sample.pdf
-                    },
-                    specular,
-                })
+        self.specular[i] = specular;
+        let o = offset_ray_origin(self.at.p.point(i), self.at.p_error.vector(i), self.at.n.normal(i), wi);
+        self.next_o.set(i, o.to_array());
+        self.next_d.set(i, wi.to_array());
+        true
+    }
+
+    /// For each path to which a direction was given: by what its throughput and the scale of roulette would be, `carry` says what they are, or
+    /// that it ends.
+    pub fn carry(
+        &mut self,
+        n: usize,
+        mut carry: impl FnMut(&Self, usize, SampledSpectrum, f32) -> Option<(SampledSpectrum, f32)>,
+    ) {
+        for i in 0..n {
+            if self.goes_on[i] == 0 {
+                continue;
+            }
+            let throughput = self.throughput.at(i) * self.next_weight.at(i);
+            match carry(self, i, throughput, self.roulette_scale[i] * self.next_scale[i]) {
+                Some((throughput, scale)) => {
+                    self.throughput.set(i, throughput);
+                    self.roulette_scale[i] = scale;
+                }
+                None => self.goes_on[i] = 0,
             }
         }
     }
 
-    /// Sends paths on their ways from their vertices. `carry` says what a path carries on, by what its throughput and the scale of roulette are, or
-    /// that it ends. How many go on, whose rays are known then, but not what these meet.
-    #[inline(always)]
-    pub fn leave(
-        &mut self,
-        mut n: usize,
-        scene: &Scene,
-        mut carry: impl FnMut(&Self, usize, &Turn) -> Option<(SampledSpectrum, f32)>,
-    ) -> usize {
-        let sky = scene.lights.sky();
-        let mut ended = std::mem::take(&mut self.ended);
-        ended.clear();
-        for i in 0..n {
-            let going = self.turn(i).and_then(|turn| carry(self, i, &turn).map(|carried| (turn, carried)));
-            let Some((turn, carried)) = going else {
-                ended.push(i as u32);
-                continue;
-            };
-            self.throughput.set(i, carried.0);
-            self.roulette_scale[i] = carried.1;
-            self.specular[i] = turn.specular;
-            let is_alone = matches!(self.scattering[i], Scattering::Alone(_));
-            if is_alone {
-                self.next_o.set(i, turn.o.to_array());
-                self.next_d.set(i, turn.wi.to_array());
-                self.next_pdf[i] = turn.pdf;
-            }
-            if let Some((_, sky)) = sky {
-                let place = if is_alone { scene.lights.place_of_escape(turn.wi) } else { Some(self.place(i, sky)) };
-                self.escape_place[i] = place;
-            }
-        }
+    /// How many paths go on.
+    pub fn count_going(&self, n: usize) -> u64 {
+        u64::from(self.goes_on[..n].iter().sum::<u32>())
+    }
+
+    /// Sends the paths that go on on their ways. How many do, whose rays are known then, but not what these meet.
+    pub fn leave(&mut self, mut n: usize, scene: &Scene) -> usize {
         // All at once; few lanes move.
         let SurfaceLanes { p, p_error, n: normal, ns, .. } = &self.at;
         for (previous, here) in self.previous.iter_mut().zip([p, p_error, normal, ns]) {
@@ -530,29 +522,21 @@ impl Batch {
         self.o.copy(n, &self.next_o);
         self.d.copy(n, &self.next_d);
         self.bsdf_pdf[..n].copy_from_slice(&self.next_pdf[..n]);
-        for &i in ended.iter().rev() {
-            n -= 1;
-            self.shift(i as usize, n);
+        if let Some((_, sky)) = scene.lights.sky() {
+            for i in (0..n).filter(|&i| self.goes_on[i] != 0) {
+                self.escape_place[i] = Some(self.place(i, sky));
+            }
         }
-        self.ended = ended;
+        // From the last one: what takes the place of a path that ends has gone on.
+        for i in (0..n).rev() {
+            if self.goes_on[i] == 0 {
+                n -= 1;
+                self.shift(i, n);
+            }
+        }
         for i in 0..n {
             self.rays[i] = self.ray(i);
         }
         n
     }
-}
-
-/// A direction that a path takes from a vertex.
-pub(crate) struct Turn {
-    /// What the throughput is multiplied with: f cos / pdf.
-    pub weight: SampledSpectrum,
-    /// What the scale of roulette is multiplied with.
-    pub scale: f32,
-    /// The direction, unit.
-    pub wi: Vec3,
-    /// Where the ray begins.
-    pub o: Point3,
-    /// The density with which scattering finds the direction, 1/sr.
-    pub pdf: f32,
-    pub specular: bool,
 }

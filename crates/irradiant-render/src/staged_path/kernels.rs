@@ -1,6 +1,7 @@
 //! Stages that are computed in lanes.
 
 use super::batch::Batch;
+use crate::path::{Roulette, survival_probability};
 use irradiant_core::bxdf::conductor::mirror_lobe;
 use irradiant_core::bxdf::fresnel::fresnel_conductor;
 use irradiant_core::bxdf::is_usable;
@@ -203,6 +204,36 @@ impl Kernel for Scatter<'_> {
             let wi = b.next_d.vector(i);
             let o: Point3 = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
             b.next_o.set(i, o.to_array());
+        }
+    }
+}
+
+/// What paths carry on in the directions that they were given, and roulette.
+pub(super) struct Survive<'a> {
+    pub batch: &'a mut Batch,
+    pub n: usize,
+    pub roulette: Roulette,
+    /// Scattering events by then.
+    pub depth: u32,
+}
+
+impl Kernel for Survive<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self { batch: b, n, roulette, depth } = self;
+        for i in whole(n) {
+            let throughput = b.throughput.at(i) * b.next_weight.at(i);
+            let scale = b.roulette_scale[i] * b.next_scale[i];
+            let survival = match roulette {
+                Roulette::Throughput => survival_probability(&throughput, scale, depth),
+                Roulette::Constant(q) => 1.0 - q,
+            };
+            let is_tried = survival < 1.0;
+            let ends = throughput.is_black() | (is_tried & (b.scatter.roulette(i) >= survival));
+            b.throughput.set(i, throughput * if is_tried { 1.0 / survival } else { 1.0 });
+            b.roulette_scale[i] = scale;
+            b.goes_on[i] = if ends { 0 } else { b.goes_on[i] };
         }
     }
 }

@@ -22,7 +22,7 @@ pub(crate) use batch::{Batch, Plain};
 
 use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
-use crate::path::{PathIntegrator, Roulette, Walk, survival_probability};
+use crate::path::{PathIntegrator, Walk};
 use crate::record::NoRecord;
 use batch::{Scattering, Surface, nowhere};
 use irradiant_core::bxdf::Bxdf;
@@ -32,7 +32,7 @@ use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
 use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{Basis, SampledSpectrum};
-use kernels::{Numbers, Surfaces};
+use kernels::{Numbers, Surfaces, Survive};
 
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
@@ -250,27 +250,12 @@ impl PathIntegrator {
 
     /// Plays roulette and traces the rays of paths that go on, `depth` scattering events by then. How many do.
     fn go_on(&self, b: &mut Batch, n: usize, depth: u32, scene: &Scene, stats: &mut RenderStats) -> usize {
-        let n = b.leave(n, scene, |b, i, turn| {
-            let mut throughput = b.throughput.at(i) * turn.weight;
-            let roulette_scale = b.roulette_scale[i] * turn.scale;
-            stats.scatterings += 1;
-            stats.longest_path = stats.longest_path.max(depth);
-            if throughput.is_black() {
-                return None;
-            }
-            let survival = match self.roulette {
-                Roulette::Throughput => survival_probability(&throughput, roulette_scale, depth),
-                Roulette::Constant(q) => 1.0 - q,
-            };
-            if survival < 1.0 {
-                if b.scatter.roulette(i) >= survival {
-                    return None;
-                }
-                throughput *= 1.0 / survival;
-            }
-            stats.bounce_rays += 1;
-            Some((throughput, roulette_scale))
-        });
+        let directions = b.count_going(n);
+        scene.geometry.level().run(Survive { batch: b, n, roulette: self.roulette, depth });
+        stats.scatterings += directions;
+        stats.longest_path = stats.longest_path.max(if directions > 0 { depth } else { 0 });
+        let n = b.leave(n, scene);
+        stats.bounce_rays += n as u64;
         b.light_splits = self.light_splits_at(depth - 1);
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, n, scene);

@@ -124,9 +124,8 @@ impl PathIntegrator {
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
-        let n = b.leave(n, scene, |b, i, turn| {
+        b.carry(n, |b, i, throughput, scale| {
             let s = b.sample[i] as usize;
-            let (throughput, scale) = (b.throughput.at(i) * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(1);
             // What is of no use to its own pixel is of use to others. Roulette ends no path here.
@@ -136,6 +135,7 @@ impl PathIntegrator {
             stats.bounce_rays += 1;
             Some((throughput, scale))
         });
+        let n = b.leave(n, scene);
         b.light_splits = self.light_splits_at(0);
         scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
         n
@@ -238,9 +238,8 @@ impl PathIntegrator {
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
-        let n = b.leave(n, scene, |b, i, turn| {
+        b.carry(n, |b, i, mut throughput, mut scale| {
             let s = b.sample[i] as usize;
-            let (mut throughput, mut scale) = (b.throughput.at(i) * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(2);
             if blocks.kinds[s] == Kind::By {
@@ -251,7 +250,7 @@ impl PathIntegrator {
                     return None;
                 }
                 throughput = SampledSpectrum::splat(1.0 / survival);
-                blocks.next[s] = Some(turn.wi);
+                blocks.next[s] = Some(b.next_d.vector(i));
             } else {
                 if throughput.is_black() {
                     return None;
@@ -267,6 +266,7 @@ impl PathIntegrator {
             stats.bounce_rays += 1;
             Some((throughput, scale))
         });
+        let n = b.leave(n, scene);
         b.light_splits = 1;
         scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
         for i in 0..n {
