@@ -297,23 +297,19 @@ impl SampleBatch {
         self.samples.clear();
         self.rays.clear();
         self.ends.clear();
-        let [_, _, wavelength, _] = &self.numbers[0].0;
-        for i in 0..n {
-            let (ray, end) = self.camera.ray(i);
-            self.rays.push(ray);
-            self.ends.push(end);
-            let weight = self.camera.weight[i];
-            self.samples.push(BatchSample {
-                pixel: self.pixels[i],
-                index: self.indices[i],
-                lambda: scene.sample_wavelengths(wavelength[i]),
-                filter_weight: self.filter_weights[i],
-                camera_weight: (!(weight < 0.0)).then_some(weight),
-                film: self.camera.film(i),
-                lens: self.camera.lens(i),
-                time_u: self.camera.time_u[i],
-            });
-        }
+        let (camera, [_, _, wavelength, _]) = (&self.camera, &self.numbers[0].0);
+        self.rays.extend((0..n).map(|i| camera.ray(i).0));
+        self.ends.extend((0..n).map(|i| camera.ray(i).1));
+        self.samples.extend((0..n).map(|i| BatchSample {
+            pixel: self.pixels[i],
+            index: self.indices[i],
+            lambda: scene.sample_wavelengths(wavelength[i]),
+            filter_weight: self.filter_weights[i],
+            camera_weight: (!(camera.weight[i] < 0.0)).then_some(camera.weight[i]),
+            film: camera.film(i),
+            lens: camera.lens(i),
+            time_u: camera.time_u[i],
+        }));
     }
 }
 
@@ -331,7 +327,7 @@ impl Kernel for DrawRays<'_> {
         let Self { batch: SampleBatch { n, pixels, streams, numbers, filter_weights, camera, .. }, scene, of_one_time } =
             self;
         let (n, [draws, lens]) = (*n, numbers);
-        streams.camera(n, draws);
+        streams.camera(n, scene.basis() == Basis::Spectral, draws);
         if scene.camera.has_lens() {
             streams.lens(n, lens);
             for i in whole(n) {

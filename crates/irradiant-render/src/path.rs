@@ -259,6 +259,11 @@ impl PathIntegrator {
         self.max_depth.is_some_and(|limit| depth >= limit)
     }
 
+    /// Whether a path may end by chance at its scattering event of this number.
+    pub(crate) fn plays_roulette(&self, depth: u32) -> bool {
+        depth > SPARED || matches!(self.roulette, Roulette::Constant(_))
+    }
+
     /// Strata of the choice of a light at the surface after so many scattering events.
     #[inline]
     pub(crate) fn light_splits_at(&self, depth: u32) -> u32 {
@@ -551,6 +556,9 @@ pub fn power_heuristic(a: f32, b: f32) -> f32 {
     }
 }
 
+/// So many events end no path by chance that it carries little.
+const SPARED: u32 = 1;
+
 /// After this many events even a path that loses nothing is ended now and then, so that closed scenes of albedo 1 end.
 const LONG_PATH: u32 = 128;
 
@@ -568,7 +576,7 @@ const ROULETTE_BELOW: f32 = 0.5;
 /// events.
 #[inline(always)]
 pub(crate) fn survival_probability(throughput: &SampledSpectrum, roulette_scale: f32, depth: u32) -> f32 {
-    if depth <= 1 {
+    if depth <= SPARED {
         return 1.0;
     }
     let carried = (*throughput * roulette_scale).max_component();

@@ -56,33 +56,33 @@ impl StreamLanes {
         (self.reversed_index[to], self.seed[to]) = (self.reversed_index[from], self.seed[from]);
     }
 
-    /// As [`SampleStream::camera`], of `n` lanes: place on the film, wavelength, time.
+    /// As [`SampleStream::camera`], of `n` lanes: place on the film, perhaps wavelength, time.
     #[inline(always)]
-    pub fn camera(&self, n: usize, out: &mut BlockLanes) {
-        self.block(n, 0, out);
+    pub fn camera(&self, n: usize, wavelength: bool, out: &mut BlockLanes) {
+        self.block(n, 0, [wavelength, true], out);
     }
 
     /// As [`SampleStream::lens`], of `n` lanes.
     #[inline(always)]
     pub fn lens(&self, n: usize, out: &mut BlockLanes) {
-        self.block(n, 1, out);
+        self.block(n, 1, [false, false], out);
     }
 
-    /// As [`SampleStream::light`], of `n` lanes.
+    /// As [`SampleStream::light`], of `n` lanes: where on the light, perhaps which; nothing to spare.
     #[inline(always)]
-    pub fn light(&self, n: usize, depth: u32, out: &mut BlockLanes) {
-        self.block(n, CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX, out);
+    pub fn light(&self, n: usize, depth: u32, pick: bool, out: &mut BlockLanes) {
+        self.block(n, CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX, [pick, false], out);
     }
 
-    /// As [`SampleStream::scatter`], of `n` lanes.
+    /// As [`SampleStream::scatter`], of `n` lanes: which direction, perhaps which lobe, perhaps roulette.
     #[inline(always)]
-    pub fn scatter(&self, n: usize, depth: u32, out: &mut BlockLanes) {
-        self.block(n, CAMERA_BLOCKS + 1 + depth * BLOCKS_PER_VERTEX, out);
+    pub fn scatter(&self, n: usize, depth: u32, lobe: bool, roulette: bool, out: &mut BlockLanes) {
+        self.block(n, CAMERA_BLOCKS + 1 + depth * BLOCKS_PER_VERTEX, [lobe, roulette], out);
     }
 
     #[inline(always)]
-    fn block(&self, n: usize, block: u32, out: &mut BlockLanes) {
-        owen_sobol_4d_lanes(n, &self.reversed_index, &self.seed, block, &mut out.0);
+    fn block(&self, n: usize, block: u32, asked: [bool; 2], out: &mut BlockLanes) {
+        owen_sobol_4d_lanes(n, &self.reversed_index, &self.seed, block, asked, &mut out.0);
     }
 }
 
@@ -113,9 +113,10 @@ impl BlockLanes {
         self.0[3][i]
     }
 
-    /// A lane of a light's block.
+    /// [`LightDraws::pick_in_stratum`] of a light's block.
     #[inline]
-    pub fn light_draws(&self, i: usize) -> LightDraws {
-        LightDraws { pick: self.0[2][i], uv: self.uv(i), resample: self.0[3][i] }
+    pub fn pick_in_stratum(&self, lane: usize, i: u32, count: u32) -> f32 {
+        let [_, _, pick, _] = &self.0;
+        LightDraws { pick: pick[lane], uv: Point2::ZERO, resample: 0.0 }.pick_in_stratum(i, count)
     }
 }

@@ -1,6 +1,7 @@
 //! The numbers of many paths side by side, between vertices and at them.
 
-use super::kernels::{PlacesOfBounces, PlacesOfCamera, Scatter};
+use super::kernels::{Numbers, PlacesOfBounces, PlacesOfCamera, Scatter};
+use super::lamps::has_one_light;
 use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
@@ -444,6 +445,12 @@ impl Batch {
                 Bsdf::new(self.at.frame(i), Bxdf::Diffuse(Diffuse::new(self.reflectance.at(i))))
             }
         }
+    }
+
+    /// Draws the numbers of vertices that are known, those for roulette only where it is played.
+    pub fn draw(&mut self, n: usize, depth: u32, scene: &Scene, roulette: bool) {
+        let (pick, lobe) = (!has_one_light(scene), !self.bsdfs.is_empty());
+        scene.geometry.level().run(Numbers { batch: self, n, depth, pick, lobe, roulette });
     }
 
     /// Draws directions, and the rays that go there.

@@ -25,16 +25,26 @@ impl Kernel for Surfaces<'_> {
     }
 }
 
-/// The random numbers of a vertex.
-pub(super) struct Numbers<'a>(pub &'a mut Batch, pub usize, pub u32);
+/// The random numbers of a vertex. All of them take half as long again as what most vertices ask for.
+pub(super) struct Numbers<'a> {
+    pub batch: &'a mut Batch,
+    pub n: usize,
+    pub depth: u32,
+    /// Whether there are several lights.
+    pub pick: bool,
+    /// Whether there are models of their own, with lobes.
+    pub lobe: bool,
+    /// Whether paths may end by chance.
+    pub roulette: bool,
+}
 
 impl Kernel for Numbers<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self(b, n, depth) = self;
-        b.streams.light(n, depth, &mut b.light);
-        b.streams.scatter(n, depth, &mut b.scatter);
+        let Self { batch: b, n, depth, pick, lobe, roulette } = self;
+        b.streams.light(n, depth, pick, &mut b.light);
+        b.streams.scatter(n, depth, lobe, roulette, &mut b.scatter);
     }
 }
 

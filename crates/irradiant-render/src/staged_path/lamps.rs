@@ -20,6 +20,11 @@ use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 /// All of [`Compensated`](SampleMode::Compensated): hits are weighed against samples.
 const MODE: SampleMode = SampleMode::Compensated;
 
+/// Whether there is nothing to pick: one light, at all places.
+pub(super) fn has_one_light(scene: &Scene) -> bool {
+    matches!(scene.light_sampler, LightSampler::Uniform(_)) && scene.lights.len() == 1
+}
+
 impl Batch {
     /// A path meets a lamp: what that emits is still to be weighed.
     #[inline]
@@ -105,18 +110,15 @@ impl Batch {
     /// A light of each path whose surface scatters light that it is not known where to look for.
     pub(super) fn pick_lights(&mut self, n: usize, scene: &Scene) {
         self.seek_light(n);
-        match &scene.light_sampler {
-            LightSampler::Uniform(_) if scene.lights.len() == 1 => {
-                for &i in &self.seeking {
-                    (self.picked[i as usize], self.pmf[i as usize]) = (0, 1.0);
-                }
+        if has_one_light(scene) {
+            for &i in &self.seeking {
+                (self.picked[i as usize], self.pmf[i as usize]) = (0, 1.0);
             }
-            sampler => {
-                let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
-                let [_, _, pick, _] = &self.light.0;
-                let (level, tree) = (scene.geometry.level(), &mut self.tree);
-                sampler.sample_lanes(level, &self.seeking, at, pick, tree, &mut self.picked, &mut self.pmf);
-            }
+        } else {
+            let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
+            let [_, _, pick, _] = &self.light.0;
+            let (level, tree) = (scene.geometry.level(), &mut self.tree);
+            scene.light_sampler.sample_lanes(level, &self.seeking, at, pick, tree, &mut self.picked, &mut self.pmf);
         }
         self.light_times[..n].copy_from_slice(&self.pmf[..n]);
         self.light_share[..n].fill(1.0);
@@ -235,7 +237,7 @@ impl Batch {
                 continue;
             }
             let sample = if may_pass && light.is_delta() {
-                radiance[s] += self.light_through_mixes(i, depth, scene, lambda, stats);
+                radiance[s] += self.light_through_mixes(i, depth, scene, &samples[s], stats);
                 None
             } else {
                 light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE)
@@ -262,7 +264,7 @@ impl Batch {
         i: usize,
         depth: u32,
         scene: &Scene,
-        lambda: &Wavelengths,
+        sample: &BatchSample,
         stats: &mut RenderStats,
     ) -> SampledSpectrum {
         direct_light(
@@ -270,8 +272,8 @@ impl Batch {
             &self.interaction(i),
             &self.bsdf(i),
             &self.throughput.at(i),
-            lambda,
-            &self.light.light_draws(i),
+            &sample.lambda,
+            &sample.stream(scene).light(depth),
             None,
             1,
             depth,

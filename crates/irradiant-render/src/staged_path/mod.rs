@@ -32,7 +32,7 @@ use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
 use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{Basis, SampledSpectrum};
-use kernels::{Numbers, Surfaces, Survive};
+use kernels::{Surfaces, Survive};
 
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
@@ -74,7 +74,7 @@ impl PathIntegrator {
             if n == 0 || self.is_at_limit(depth) {
                 return;
             }
-            scene.geometry.level().run(Numbers(b, n, depth));
+            b.draw(n, depth, scene, self.plays_roulette(depth + 1));
             b.light_samples(n, depth, self.light_splits_at(depth), scene, samples, radiance, stats);
             b.scatter(n, scene);
             depth += 1;

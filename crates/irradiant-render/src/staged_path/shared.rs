@@ -2,7 +2,6 @@
 //! and after them its paths go by the common stages.
 
 use super::batch::{Batch, Scattering, Surface};
-use super::kernels::Numbers;
 use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, survival_probability};
@@ -56,7 +55,6 @@ impl PathIntegrator {
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
-        let level = scene.geometry.level();
         blocks.begin(samples.len());
 
         // First vertices.
@@ -65,7 +63,7 @@ impl PathIntegrator {
         if self.is_at_limit(0) || n == 0 {
             return;
         }
-        level.run(Numbers(b, n, 0));
+        b.draw(n, 0, scene, false);
         b.light_samples(n, 0, self.light_splits_at(0), scene, samples, &mut blocks.own, stats);
         b.scatter(n, scene);
         for i in 0..n {
@@ -101,7 +99,7 @@ impl PathIntegrator {
         }
         if !self.is_at_limit(1) && n > 0 {
             self.share_second(b, n, blocks);
-            level.run(Numbers(b, n, 1));
+            b.draw(n, 1, scene, true);
             self.light_at_second(b, n, scene, samples, blocks, stats);
             b.scatter(n, scene);
             for (s, kind) in blocks.kinds.iter().enumerate() {

@@ -74,7 +74,7 @@ impl Batch {
         let level = scene.geometry.level();
         for stratum in 0..splits {
             for i in 0..n {
-                self.light_pick[i] = self.light.light_draws(i).pick_in_stratum(stratum, splits);
+                self.light_pick[i] = self.light.pick_in_stratum(i, stratum, splits);
             }
             let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
             let (picked, pmf) = (&mut self.picked, &mut self.pmf);
