@@ -91,3 +91,62 @@ impl Camera {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{Setup, orthographic, perspective, realistic};
+    use super::*;
+    use crate::geometry::{Kernel, Level};
+    use irradiant_scene::desc::CameraKind;
+    use irradiant_scene::desc::camera::ApertureShape;
+    use irradiant_testkit::Rng;
+
+    struct Look<'a>(&'a Camera, &'a mut CameraLanes);
+
+    impl Kernel for Look<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run(self) {
+            self.0.rays(N, self.1);
+        }
+    }
+
+    /// Not whole vectors.
+    const N: usize = 233;
+
+    // With lenses and without, on the film and beyond it, where a real lens is blind; all levels: as one ray at a time, to the bit.
+    #[test]
+    fn lanes_have_the_rays_of_single_samples() {
+        let kinds = [
+            perspective(40.0, 0.0, 1e6),
+            perspective(60.0, 0.1, 3.0),
+            orthographic([-2.0, 2.0, -1.0, 1.0], 0.0, 1e6),
+            orthographic([-2.0, 2.0, -1.0, 1.0], 0.2, 4.0),
+            CameraKind::Spherical { equirectangular: true },
+            realistic(10.0, 2.0, ApertureShape::Circular),
+        ];
+        let mut blind = 0;
+        for kind in kinds {
+            let camera = Setup::new(kind, [64, 32]).compile().camera;
+            let mut rng = Rng::new(5);
+            let mut lanes = CameraLanes::NONE;
+            for i in 0..N {
+                (lanes.film[0][i], lanes.film[1][i]) = (80.0 * rng.next_f32() - 8.0, 48.0 * rng.next_f32() - 8.0);
+                (lanes.lens[0][i], lanes.lens[1][i]) = (rng.next_f32(), rng.next_f32());
+                lanes.time_u[i] = rng.next_f32();
+            }
+            for level in Level::available() {
+                level.run(Look(&camera, &mut lanes));
+                for i in 0..N {
+                    let single = camera.generate_ray(lanes.film(i), lanes.lens(i), lanes.time_u[i]);
+                    let (ray, end) = lanes.ray(i);
+                    assert_eq!(end > 0.0, single.is_some(), "{level:?}");
+                    blind += usize::from(single.is_none());
+                    let Some(single) = single else { continue };
+                    assert_eq!((ray, lanes.weight[i]), (single.ray, single.weight), "{level:?}");
+                }
+            }
+        }
+        assert!(blind > 0, "every place of the real lens sees something");
+    }
+}

@@ -208,6 +208,8 @@ fn mitchell(x: f32, b: f32, c: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Kernel, Level};
+    use irradiant_math::lanes::LANES;
     use irradiant_scene::{Span, Spanned};
 
     fn filter(kind: FilterKind, radius: f32) -> Filter {
@@ -304,6 +306,37 @@ mod tests {
                 assert!((a - b).abs() < 0.05 * most, "{kind:?}: {a} {b}");
             }
             assert_eq!(filter.value([1.1 * radius, 0.0]), 0.0);
+        }
+    }
+
+    struct Draw<'a>(&'a Filter, &'a mut [Floats; 2], &'a mut Floats);
+
+    impl Kernel for Draw<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run(self) {
+            self.0.sample_lanes(N, self.1, self.2);
+        }
+    }
+
+    /// Not whole vectors.
+    const N: usize = 233;
+
+    #[test]
+    fn lanes_have_the_places_of_single_samples() {
+        let s = |x: f32| Spanned::unplaced(x);
+        let kinds = [FilterKind::Box, FilterKind::Triangle, FilterKind::Sinc { tau: s(3.0) }];
+        for filter in kinds.map(|kind| filter(kind, 1.7)) {
+            let mut rng = irradiant_testkit::Rng::new(1);
+            let drawn: [Floats; 2] = std::array::from_fn(|_| std::array::from_fn(|_| rng.next_f32()));
+            for level in Level::available() {
+                let (mut places, mut weight) = (drawn, [-7.0; LANES]);
+                level.run(Draw(&filter, &mut places, &mut weight));
+                for i in 0..N {
+                    let found = FilterSample { offset: [places[0][i], places[1][i]], weight: weight[i] };
+                    assert_eq!(found, filter.sample(Point2::new(drawn[0][i], drawn[1][i])), "{level:?}");
+                }
+            }
         }
     }
 

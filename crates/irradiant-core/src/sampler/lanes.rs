@@ -120,3 +120,34 @@ impl BlockLanes {
         LightDraws { pick: pick[lane], uv: Point2::ZERO, resample: 0.0 }.pick_in_stratum(i, count)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use irradiant_scene::desc::SamplerKind;
+
+    // Runs that a sampler continues, and such as begin another sequence, by a pixel far off or by a sample beyond 2^32.
+    #[test]
+    fn runs_of_samples_have_their_own_numbers() {
+        let kinds = [SamplerKind::ZSobol, SamplerKind::PaddedSobol(Randomization::FastOwen)];
+        for (kind, spp) in kinds.into_iter().flat_map(|kind| [(kind, 64), (kind, 1 << 24)]) {
+            let sampler = Sampler::new(kind, spp, [512, 512], 11);
+            for (pixel, samples) in [
+                ([0, 0], 0..17),
+                ([9, 200], 3..64),
+                ([-1, 70_000], 60..70),
+                ([15, 15], (1 << 24) - 5..(1 << 24) + 6),
+                ([1, 1], 5..5),
+                ([1, 1], u32::MAX - 3..u32::MAX),
+            ] {
+                let mut lanes = StreamLanes::NONE;
+                lanes.set(2, &sampler, pixel, samples.clone());
+                for (k, index) in samples.enumerate() {
+                    let single = padded_owen(&sampler.stream(pixel, index)).expect("a padded sequence");
+                    let found = (lanes.reversed_index[2 + k], lanes.seed[2 + k]);
+                    assert_eq!(found, single, "{kind:?} {spp} {pixel:?} {index}");
+                }
+            }
+        }
+    }
+}
