@@ -34,10 +34,10 @@ impl StreamLanes {
     pub fn set(&mut self, i: usize, sampler: &Sampler, pixel: [i32; 2], samples: Range<u32>) {
         let Some(last) = samples.end.checked_sub(1).filter(|last| *last >= samples.start) else { return };
         let ends = [samples.start, last].map(|index| padded_owen(&sampler.stream(pixel, index)));
-        let [Some((first, seed)), Some((last, last_seed))] = ends else { return };
-        // Of one seed, they follow each other in one sequence.
+        let [Some((first, seed)), Some((last, _))] = ends else { return };
         let (first, last) = (first.reverse_bits(), last.reverse_bits());
-        if seed == last_seed && last.checked_sub(first) == Some(samples.end - 1 - samples.start) {
+        // They follow each other in one sequence, unless it began anew in between.
+        if last.checked_sub(first) == Some(samples.end - 1 - samples.start) {
             for (k, index) in (first..=last).enumerate() {
                 (self.reversed_index[i + k], self.seed[i + k]) = (index.reverse_bits(), seed);
             }
