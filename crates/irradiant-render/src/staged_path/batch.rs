@@ -1,7 +1,7 @@
 //! The numbers of many paths side by side, between vertices and at them.
 
 use super::kernels::{Numbers, PlacesOfBounces, PlacesOfCamera, Scatter};
-use super::lamps::has_one_light;
+use super::lamps::{PlainLamp, has_one_light};
 use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
@@ -154,6 +154,8 @@ pub(crate) struct Batch {
     // Light samples.
     /// Paths that look for light.
     pub(super) seeking: Vec<u32>,
+    /// What is known of each light.
+    pub(super) known_lamps: Vec<Option<PlainLamp>>,
     pub(super) tree: TreeLanes,
     /// The lights that were picked.
     pub(super) picked: [u32; LANES],
@@ -236,6 +238,7 @@ impl Batch {
             scatter: BlockLanes::ZERO,
             lamps_met: Vec::new(),
             seeking: Vec::new(),
+            known_lamps: PlainLamp::all(scene),
             tree: TreeLanes::NONE,
             picked: [0; LANES],
             rectangles: RectangleLanes::NONE,

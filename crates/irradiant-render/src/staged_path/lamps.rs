@@ -15,7 +15,7 @@ use irradiant_core::light_sampler::{LightSampler, PointLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::Point2;
 use irradiant_math::lanes::LANES;
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 
 /// All of [`Compensated`](SampleMode::Compensated): hits are weighed against samples.
 const MODE: SampleMode = SampleMode::Compensated;
@@ -23,6 +23,40 @@ const MODE: SampleMode = SampleMode::Compensated;
 /// Whether there is nothing to pick: one light, at all places.
 pub(super) fn has_one_light(scene: &Scene) -> bool {
     matches!(scene.light_sampler, LightSampler::Uniform(_)) && scene.lights.len() == 1
+}
+
+/// A lamp that shines evenly, of a shape that may have lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlainLamp {
+    /// Of its light, with what its opacity leaves.
+    radiance: SampledSpectrum,
+    two_sided: u32,
+}
+
+impl PlainLamp {
+    fn of(scene: &Scene, id: LightId, lambda: &Wavelengths) -> Option<Self> {
+        match scene.lights.get(id) {
+            Light::Area(lamp) => match (&lamp.shape, &lamp.radiance, lamp.alpha) {
+                (
+                    EmitterShape::Rectangle(_) | EmitterShape::Sphere(_),
+                    AreaRadiance::Uniform(emission),
+                    AreaAlpha::Constant(alpha),
+                ) => {
+                    let radiance = emission.sample(lambda) * lamp.scale * alpha;
+                    Some(Self { radiance, two_sided: u32::from(lamp.two_sided) })
+                }
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// What is known of all lights, where it is the same for all paths: in the RGB basis, and where they are few enough to stay in a cache.
+    pub fn all(scene: &Scene) -> Vec<Option<Self>> {
+        const FEW: usize = 1 << 13;
+        let known = if scene.basis() == Basis::Rgb && scene.lights.len() <= FEW { scene.lights.len() } else { 0 };
+        (0..known as u32).map(|id| Self::of(scene, LightId(id), &Wavelengths::rgb())).collect()
+    }
 }
 
 impl Batch {
@@ -141,6 +175,43 @@ impl Batch {
         }
     }
 
+    /// Has the shape of a plain lamp in the lanes of its kind. Whether there are lanes for it.
+    #[inline(always)]
+    fn hold(&mut self, i: usize, id: LightId, scene: &Scene) -> bool {
+        if self.rectangle[i] == id.0 {
+            return true;
+        }
+        if self.sphere[i] == id.0 {
+            self.spheres.ask(i);
+            return true;
+        }
+        self.hold_another(i, id, scene)
+    }
+
+    fn hold_another(&mut self, i: usize, id: LightId, scene: &Scene) -> bool {
+        let Light::Area(lamp) = scene.lights.get(id) else { return false };
+        match &lamp.shape {
+            EmitterShape::Rectangle(rectangle) => {
+                self.rectangles.set(i, rectangle);
+                self.rectangle[i] = id.0;
+                true
+            }
+            EmitterShape::Sphere(sphere) => {
+                let is_ball = self.spheres.set(i, sphere);
+                if is_ball {
+                    self.sphere[i] = id.0;
+                    self.spheres.ask(i);
+                }
+                is_ball
+            }
+            EmitterShape::Triangle(_)
+            | EmitterShape::Bilinear(_)
+            | EmitterShape::Disk(_)
+            | EmitterShape::Cylinder(_)
+            | EmitterShape::Curve(_) => false,
+        }
+    }
+
     /// Points of those lamps that have lanes; the others are put down to be asked alone. Whether there are any.
     fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[BatchSample]) -> bool {
         let sky = scene.lights.sky();
@@ -153,39 +224,18 @@ impl Batch {
                 continue;
             }
             let id = LightId(self.picked[i]);
-            if let Light::Area(lamp) = scene.lights.get(id)
-                && let (AreaRadiance::Uniform(emission), AreaAlpha::Constant(alpha)) = (&lamp.radiance, lamp.alpha)
+            let lamp = match self.known_lamps.get(id.0 as usize) {
+                Some(known) => *known,
+                None => PlainLamp::of(scene, id, &samples[self.sample[i] as usize].lambda),
+            };
+            if let Some(lamp) = lamp
+                && self.hold(i, id, scene)
             {
-                let has_lanes = match &lamp.shape {
-                    EmitterShape::Rectangle(rectangle) => {
-                        if self.rectangle[i] != id.0 {
-                            self.rectangles.set(i, rectangle);
-                            self.rectangle[i] = id.0;
-                        }
-                        any_rectangle = true;
-                        true
-                    }
-                    EmitterShape::Sphere(sphere) => {
-                        let is_ball = self.sphere[i] == id.0 || self.spheres.set(i, sphere);
-                        if is_ball {
-                            self.sphere[i] = id.0;
-                            self.spheres.ask(i);
-                            any_sphere = true;
-                        }
-                        is_ball
-                    }
-                    EmitterShape::Triangle(_)
-                    | EmitterShape::Bilinear(_)
-                    | EmitterShape::Disk(_)
-                    | EmitterShape::Cylinder(_)
-                    | EmitterShape::Curve(_) => false,
-                };
-                if has_lanes {
-                    self.arriving
-                        .set(i, emission.sample(&samples[self.sample[i] as usize].lambda) * lamp.scale * alpha);
-                    (self.is_delta[i], self.two_sided[i]) = (0, u32::from(lamp.two_sided));
-                    continue;
-                }
+                any_rectangle |= self.rectangle[i] == id.0;
+                any_sphere |= self.sphere[i] == id.0;
+                self.arriving.set(i, lamp.radiance);
+                (self.is_delta[i], self.two_sided[i]) = (0, lamp.two_sided);
+                continue;
             }
             let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(self.light.uv(i), MODE));
             self.light_alone.push((i as u32, line));
