@@ -55,6 +55,14 @@ impl<const N: usize> Triples<N> {
         (self.x[i], self.y[i], self.z[i]) = (x, y, z);
     }
 
+    /// Sets those of the first `n` lanes to what others are.
+    #[inline(always)]
+    pub fn copy(&mut self, n: usize, from: &Self) {
+        self.x[..n].copy_from_slice(&from.x[..n]);
+        self.y[..n].copy_from_slice(&from.y[..n]);
+        self.z[..n].copy_from_slice(&from.z[..n]);
+    }
+
     /// Those of lane `from` go to lane `to`.
     #[inline(always)]
     pub fn shift(&mut self, to: usize, from: usize) {

@@ -2,14 +2,15 @@
 //! numbers to the film.
 
 use crate::integrator::{RenderStats, WorkUnit};
-use irradiant_core::camera::CameraRay;
+use irradiant_core::camera::{CameraLanes, CameraRay};
 use irradiant_core::film::FilmTile;
 use irradiant_core::geometry::{Hit, Kernel};
 use irradiant_core::sampler::{BlockLanes, CameraDraws, SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
-use irradiant_math::lanes::{LANES, WHOLE};
+use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE, whole};
 use irradiant_math::{Point2, Point3, Ray, Vec3};
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
+use std::ops::Range;
 
 /// A sample on its way: random numbers, wavelengths, the camera's ray.
 #[derive(Clone, Copy)]
@@ -45,27 +46,20 @@ pub fn camera_sample_by<'a>(
     draws: CameraDraws,
 ) -> CameraSample<'a> {
     let lens = if scene.camera.has_lens() { stream.lens() } else { LENS_CENTER };
-    camera_sample_of(scene, pixel, index, stream, draws, lens)
+    let lambda = scene.sample_wavelengths(draws.wavelength);
+    let filtered = scene.filter.sample(scene.film_draw(draws.film));
+    let film = Point2::new(on_film(pixel[0], filtered.offset[0]), on_film(pixel[1], filtered.offset[1]));
+    let camera_ray = scene.camera.generate_ray(film, lens, draws.time);
+    CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
 }
 
 /// Where rays pass a camera that has no lens.
 const LENS_CENTER: Point2 = Point2 { x: 0.5, y: 0.5 };
 
-/// As [`camera_sample`], by these numbers.
+/// A coordinate on the film, pixels, so far from the middle of a pixel.
 #[inline(always)]
-fn camera_sample_of<'a>(
-    scene: &'a Scene,
-    pixel: [i32; 2],
-    index: u32,
-    stream: SampleStream<'a>,
-    draws: CameraDraws,
-    lens: Point2,
-) -> CameraSample<'a> {
-    let lambda = scene.sample_wavelengths(draws.wavelength);
-    let filtered = scene.filter.sample(scene.film_draw(draws.film));
-    let film = Point2::new(pixel[0] as f32 + 0.5 + filtered.offset[0], pixel[1] as f32 + 0.5 + filtered.offset[1]);
-    let camera_ray = scene.camera.generate_ray(film, lens, draws.time);
-    CameraSample { pixel, index, stream, lambda, filter_weight: filtered.weight, camera_ray }
+fn on_film(pixel: i32, offset: f32) -> f32 {
+    pixel as f32 + 0.5 + offset
 }
 
 /// Camera rays that are traced together.
@@ -143,54 +137,107 @@ pub fn for_each_first_hit<A, B>(
     take(&mut samples);
 }
 
+/// A sample of a batch: what is not in lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct BatchSample {
+    /// Pixel.
+    pub pixel: [i32; 2],
+    /// Sample index.
+    pub index: u32,
+    /// Its wavelengths; once a vertex has ended the secondary ones, without those.
+    pub lambda: Wavelengths,
+    /// Weight of the pixel filter (mean 1).
+    pub filter_weight: f32,
+    /// What its camera ray counts for; none where the camera sees nothing.
+    pub camera_weight: Option<f32>,
+    film: Point2,
+    lens: Point2,
+    time_u: f32,
+}
+
+impl BatchSample {
+    /// Its random numbers, named anew.
+    pub fn stream<'a>(&self, scene: &'a Scene) -> SampleStream<'a> {
+        scene.sampler.stream(self.pixel, self.index)
+    }
+
+    /// Its camera ray, made anew: few ask for the ray's neighbours.
+    pub fn camera_ray(&self, scene: &Scene) -> Option<CameraRay> {
+        scene.camera.generate_ray(self.film, self.lens, self.time_u)
+    }
+}
+
+/// What a batch's samples begin with.
+pub(crate) struct Beginnings<'a> {
+    pub streams: &'a StreamLanes,
+    pub rays: &'a CameraLanes,
+    /// What the rays meet first.
+    pub hits: &'a [Option<Hit>],
+}
+
 /// What taking many samples at once needs memory for: kept from one unit to the next.
-pub(crate) struct SampleBatch<'a> {
-    /// Samples put down: pixel, index, random numbers.
-    places: Vec<([i32; 2], u32, SampleStream<'a>)>,
-    samples: Vec<CameraSample<'a>>,
+pub(crate) struct SampleBatch {
+    /// Samples put down.
+    n: usize,
+    pixels: [[i32; 2]; LANES],
+    indices: [u32; LANES],
+    samples: Vec<BatchSample>,
     streams: StreamLanes,
     /// The camera's numbers, and where on the lens.
     numbers: [BlockLanes; 2],
+    filter_weights: Floats,
+    camera: CameraLanes,
     rays: Vec<Ray>,
     ends: Vec<f32>,
     hits: [Option<Hit>; LANES],
     seen: [SampledSpectrum; LANES],
-    layers: Vec<f32>,
+    rgb: Triples,
+    refused: Vec<usize>,
 }
 
-impl<'a> SampleBatch<'a> {
-    /// For a scene's samples.
-    pub fn new(scene: &Scene) -> Self {
+impl SampleBatch {
+    /// Of nothing yet.
+    pub fn new() -> Self {
         Self {
-            places: Vec::with_capacity(LANES),
+            n: 0,
+            pixels: [[0; 2]; LANES],
+            indices: [0; LANES],
             samples: Vec::with_capacity(LANES),
             streams: StreamLanes::NONE,
             numbers: [BlockLanes::ZERO; 2],
+            filter_weights: [0.0; LANES],
+            camera: CameraLanes::NONE,
             rays: Vec::with_capacity(LANES),
             ends: Vec::with_capacity(LANES),
             hits: [None; LANES],
             seen: [SampledSpectrum::ZERO; LANES],
-            layers: vec![0f32; scene.layers.channels()],
+            rgb: Triples::ZERO,
+            refused: Vec::new(),
         }
     }
 
     /// As [`for_each_first_hit`], of estimators that take many samples at once: [`LANES`] at most, of streams that
-    /// [have lanes](StreamLanes::can_hold). `radiance` is told the samples, their first hits, and where to put what they see, which is zero
-    /// so far.
+    /// [have lanes](StreamLanes::can_hold), for films without layers. `radiance` is told the samples, what they begin with, and where to put
+    /// what they see, which is zero so far.
     pub fn for_each(
         &mut self,
-        scene: &'a Scene,
+        scene: &Scene,
         unit: &WorkUnit,
         tile: &mut FilmTile,
         stats: &mut RenderStats,
-        mut radiance: impl FnMut(&mut [CameraSample], &[Option<Hit>], &mut [SampledSpectrum], &mut RenderStats),
+        mut radiance: impl FnMut(&mut [BatchSample], Beginnings, &mut [SampledSpectrum], &mut RenderStats),
     ) {
         // Batches of about the same size, in whole vectors: a last one of a few samples would waste most of its stages.
         let all = unit.bounds.area() * unit.samples.len();
         let together = all.div_ceil(all.div_ceil(LANES).max(1)).next_multiple_of(WHOLE).min(LANES);
-        for_each_place(unit, |pixel, index| {
-            if self.put(scene, pixel, index) == together {
-                self.take(scene, tile, stats, &mut radiance);
+        for_each_pixel(unit, |pixel| {
+            let mut samples = unit.samples.clone();
+            while !samples.is_empty() {
+                let end = samples.end.min(samples.start.saturating_add((together - self.n) as u32));
+                if self.put(scene, pixel, samples.start..end) == together {
+                    self.take(scene, tile, stats, &mut radiance);
+                }
+                samples.start = end;
             }
         });
         self.take(scene, tile, stats, &mut radiance);
@@ -199,79 +246,152 @@ impl<'a> SampleBatch<'a> {
     /// Takes the samples that have been put down.
     fn take(
         &mut self,
-        scene: &'a Scene,
+        scene: &Scene,
         tile: &mut FilmTile,
         stats: &mut RenderStats,
-        radiance: &mut impl FnMut(&mut [CameraSample], &[Option<Hit>], &mut [SampledSpectrum], &mut RenderStats),
+        radiance: &mut impl FnMut(&mut [BatchSample], Beginnings, &mut [SampledSpectrum], &mut RenderStats),
     ) {
         self.trace(scene, 1);
-        let (hits, seen) = (&self.hits[..self.samples.len()], &mut self.seen[..self.samples.len()]);
-        seen.fill(SampledSpectrum::ZERO);
-        radiance(&mut self.samples, hits, seen, stats);
-        for (sample, seen) in self.samples.iter().zip(seen) {
-            add_sample(scene, sample, tile, &mut self.layers, stats, |_, _, _, _, _| *seen);
+        let n = self.samples.len();
+        self.seen[..n].fill(SampledSpectrum::ZERO);
+        let begin = Beginnings { streams: &self.streams, rays: &self.camera, hits: &self.hits[..n] };
+        radiance(&mut self.samples, begin, &mut self.seen[..n], stats);
+        scene.geometry.level().run(AddToFilm { batch: self, scene, tile });
+        stats.paths += n as u64;
+        stats.camera_rays += self.samples.iter().filter(|sample| sample.camera_weight.is_some()).count() as u64;
+        for i in self.refused.drain(..) {
+            let BatchSample { pixel: [x, y], index, .. } = self.samples[i];
+            stats.refuse(x, y, index);
         }
     }
 
-    /// Puts down a sample. How many there are now, [`LANES`] at most.
-    pub fn put(&mut self, scene: &'a Scene, pixel: [i32; 2], index: u32) -> usize {
-        let stream = scene.sampler.stream(pixel, index);
-        self.streams.set(self.places.len(), &stream);
-        self.places.push((pixel, index, stream));
-        self.places.len()
+    /// Puts down samples of a pixel. How many there are now, [`LANES`] at most.
+    #[inline]
+    pub fn put(&mut self, scene: &Scene, pixel: [i32; 2], samples: Range<u32>) -> usize {
+        self.streams.set(self.n, &scene.sampler, pixel, samples.clone());
+        for index in samples {
+            (self.pixels[self.n], self.indices[self.n]) = (pixel, index);
+            self.n += 1;
+        }
+        self.n
     }
 
     /// Draws the camera's part of the samples that have been put down and traces its rays. So many samples, one after another, share the time
     /// of the first.
-    pub fn trace(&mut self, scene: &'a Scene, of_one_time: usize) {
+    pub fn trace(&mut self, scene: &Scene, of_one_time: usize) {
         self.draw(scene, of_one_time);
-        gather(&self.samples, &mut self.rays, &mut self.ends);
-        let hits = &mut self.hits[..self.samples.len()];
+        let hits = &mut self.hits[..self.rays.len()];
         scene.geometry.intersect_batch(&self.rays, &self.ends, &scene.alpha(), hits);
     }
 
-    /// The samples that have been traced, and what they meet.
-    pub fn traced(&mut self) -> (&mut [CameraSample<'a>], &[Option<Hit>]) {
+    /// The samples that have been traced, and what they begin with.
+    pub fn traced(&mut self) -> (&mut [BatchSample], Beginnings<'_>) {
         let n = self.samples.len();
-        (&mut self.samples, &self.hits[..n])
+        let begin = Beginnings { streams: &self.streams, rays: &self.camera, hits: &self.hits[..n] };
+        (&mut self.samples, begin)
     }
 
-    fn draw(&mut self, scene: &'a Scene, of_one_time: usize) {
+    fn draw(&mut self, scene: &Scene, of_one_time: usize) {
+        scene.geometry.level().run(DrawRays { batch: self, scene, of_one_time });
+        let n = std::mem::take(&mut self.n);
         self.samples.clear();
-        let has_lens = scene.camera.has_lens();
-        scene.geometry.level().run(CameraNumbers {
-            n: self.places.len(),
-            streams: &self.streams,
-            has_lens,
-            numbers: &mut self.numbers,
-        });
-        let [camera, lens] = &self.numbers;
-        for (i, (pixel, index, stream)) in self.places.drain(..).enumerate() {
-            let lens = if has_lens { lens.uv(i) } else { LENS_CENTER };
-            let time = camera.camera_draws(i - i % of_one_time).time;
-            let draws = CameraDraws { time, ..camera.camera_draws(i) };
-            self.samples.push(camera_sample_of(scene, pixel, index, stream, draws, lens));
-        }
+        self.rays.clear();
+        self.ends.clear();
+        let (camera, [_, _, wavelength, _]) = (&self.camera, &self.numbers[0].0);
+        self.rays.extend((0..n).map(|i| camera.ray(i).0));
+        self.ends.extend((0..n).map(|i| camera.ray(i).1));
+        self.samples.extend((0..n).map(|i| BatchSample {
+            pixel: self.pixels[i],
+            index: self.indices[i],
+            lambda: scene.sample_wavelengths(wavelength[i]),
+            filter_weight: self.filter_weights[i],
+            camera_weight: (!(camera.weight[i] < 0.0)).then_some(camera.weight[i]),
+            film: camera.film(i),
+            lens: camera.lens(i),
+            time_u: camera.time_u[i],
+        }));
     }
 }
 
-/// The camera's random numbers.
-struct CameraNumbers<'a> {
-    n: usize,
-    streams: &'a StreamLanes,
-    has_lens: bool,
-    numbers: &'a mut [BlockLanes; 2],
+/// What [`camera_sample_by`] draws for the samples that have been put down: random numbers, places on the film, rays.
+struct DrawRays<'a> {
+    batch: &'a mut SampleBatch,
+    scene: &'a Scene,
+    of_one_time: usize,
 }
 
-impl Kernel for CameraNumbers<'_> {
+impl Kernel for DrawRays<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let [camera, lens] = self.numbers;
-        self.streams.camera(self.n, camera);
-        if self.has_lens {
-            self.streams.lens(self.n, lens);
+        let Self { batch: SampleBatch { n, pixels, streams, numbers, filter_weights, camera, .. }, scene, of_one_time } =
+            self;
+        let (n, [draws, lens]) = (*n, numbers);
+        streams.camera(n, scene.basis() == Basis::Spectral, draws);
+        if scene.camera.has_lens() {
+            streams.lens(n, lens);
+            for i in whole(n) {
+                (camera.lens[0][i], camera.lens[1][i]) = (lens.uv(i).x, lens.uv(i).y);
+            }
+        } else {
+            camera.lens = [[LENS_CENTER.x; LANES], [LENS_CENTER.y; LANES]];
         }
+        for i in whole(n) {
+            let u = scene.film_draw(draws.uv(i));
+            (camera.film[0][i], camera.film[1][i]) = (u.x, u.y);
+        }
+        scene.filter.sample_lanes(n, &mut camera.film, filter_weights);
+        for i in whole(n) {
+            let ([x, y], at) = (pixels[i], camera.film(i));
+            (camera.film[0][i], camera.film[1][i]) = (on_film(x, at.x), on_film(y, at.y));
+        }
+        let [_, _, _, time_u] = &draws.0;
+        camera.time_u = *time_u;
+        if of_one_time > 1 {
+            for i in 0..n {
+                camera.time_u[i] = time_u[i - i % of_one_time];
+            }
+        }
+        scene.camera.rays(n, camera);
+    }
+}
+
+/// As [`add_sample`], of what the samples of a batch have seen.
+struct AddToFilm<'a> {
+    batch: &'a mut SampleBatch,
+    scene: &'a Scene,
+    tile: &'a mut FilmTile,
+}
+
+impl Kernel for AddToFilm<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            batch: SampleBatch { samples, pixels, filter_weights, camera, seen, rgb, refused, .. },
+            scene,
+            tile,
+        } = self;
+        let n = samples.len();
+        // All of one kind of wavelengths, or one after another.
+        let rgb_basis = Wavelengths::rgb();
+        if scene.basis() == Basis::Rgb {
+            for i in whole(n) {
+                let seen = scene.film_rgb(seen[i] * camera.weight[i], &rgb_basis);
+                rgb.set(i, seen);
+            }
+        } else {
+            for i in 0..n {
+                rgb.set(i, scene.film_rgb(seen[i] * camera.weight[i], &samples[i].lambda));
+            }
+        }
+        for i in whole(n) {
+            let weight = filter_weights[i];
+            let sees = !(camera.weight[i] < 0.0);
+            let weighted = |x: f32| if sees { x * weight } else { 0.0 };
+            rgb.set(i, [weighted(rgb.x[i]), weighted(rgb.y[i]), weighted(rgb.z[i])]);
+        }
+        tile.add_lanes(&pixels[..n], rgb, refused);
     }
 }
 
@@ -289,12 +409,17 @@ fn gather(samples: &[CameraSample], rays: &mut Vec<Ray>, ends: &mut Vec<f32>) {
 
 /// Each sample of each pixel, neighbours one after another.
 fn for_each_place(unit: &WorkUnit, mut visit: impl FnMut([i32; 2], u32)) {
+    for_each_pixel(unit, |pixel| unit.samples.clone().for_each(|index| visit(pixel, index)));
+}
+
+/// Each pixel, neighbours one after another.
+fn for_each_pixel(unit: &WorkUnit, mut visit: impl FnMut([i32; 2])) {
     let b = &unit.bounds;
     for top in (b.y0..b.y1).step_by(SQUARE) {
         for left in (b.x0..b.x1).step_by(SQUARE) {
             for y in top..b.y1.min(top + SQUARE as i32) {
                 for x in left..b.x1.min(left + SQUARE as i32) {
-                    unit.samples.clone().for_each(|index| visit([x, y], index));
+                    visit([x, y]);
                 }
             }
         }

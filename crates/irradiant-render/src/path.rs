@@ -107,10 +107,10 @@ impl Integrator for PathIntegrator {
         if !self.has_stages(scene) {
             return Box::new(move |unit, tile, stats| self.render(scene, unit, tile, stats));
         }
-        let (mut paths, mut batch) = (Batch::new(scene), SampleBatch::new(scene));
+        let (mut paths, mut batch) = (Batch::new(scene), SampleBatch::new());
         Box::new(move |unit, tile, stats| {
-            batch.for_each(scene, unit, tile, stats, |samples, hits, radiance, stats| {
-                self.radiance_of_batch(&mut paths, scene, samples, hits, radiance, stats);
+            batch.for_each(scene, unit, tile, stats, |samples, begin, radiance, stats| {
+                self.radiance_of_batch(&mut paths, scene, samples, begin, radiance, stats);
             });
         })
     }
@@ -257,6 +257,11 @@ impl PathIntegrator {
     #[inline]
     pub(crate) fn is_at_limit(&self, depth: u32) -> bool {
         self.max_depth.is_some_and(|limit| depth >= limit)
+    }
+
+    /// Whether a path may end by chance at its scattering event of this number.
+    pub(crate) fn plays_roulette(&self, depth: u32) -> bool {
+        depth > SPARED || matches!(self.roulette, Roulette::Constant(_))
     }
 
     /// Strata of the choice of a light at the surface after so many scattering events.
@@ -552,6 +557,9 @@ pub fn power_heuristic(a: f32, b: f32) -> f32 {
     }
 }
 
+/// So many events end no path by chance that it carries little.
+const SPARED: u32 = 1;
+
 /// After this many events even a path that loses nothing is ended now and then, so that closed scenes of albedo 1 end.
 const LONG_PATH: u32 = 128;
 
@@ -567,9 +575,9 @@ const ROULETTE_BELOW: f32 = 0.5;
 
 /// Chance to go on: the largest throughput, with the scale of [`Walk`] for roulette, over [`ROULETTE_BELOW`]; 1 for the first two
 /// events.
-#[inline]
+#[inline(always)]
 pub(crate) fn survival_probability(throughput: &SampledSpectrum, roulette_scale: f32, depth: u32) -> f32 {
-    if depth <= 1 {
+    if depth <= SPARED {
         return 1.0;
     }
     let carried = (*throughput * roulette_scale).max_component();

@@ -72,9 +72,10 @@ impl SampledSpectrum {
     }
 
     /// Whether every lane is exactly 0 (NaN is not).
-    #[inline]
+    #[inline(always)]
     pub fn is_black(self) -> bool {
-        self.0 == [0.0; N_WAVELENGTHS]
+        let [a, b, c, d] = self.0;
+        (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0)
     }
 
     /// Whether no lane is infinite or NaN.

@@ -107,12 +107,19 @@ impl Sensor {
     /// Sensor RGB of `radiance` (W/(m^2 sr nm) in the spectral basis), an unbiased estimate of the integral over
     /// wavelength; lanes of density 0 count nothing. In the RGB basis the first three lanes times
     /// `imaging_ratio * CIE_Y_INTEGRAL`.
-    #[inline]
+    #[inline(always)]
     pub fn to_rgb(&self, radiance: SampledSpectrum, wavelengths: &Wavelengths) -> [f32; 3] {
-        if wavelengths.basis == Basis::Rgb {
-            let scale = self.imaging_ratio * CIE_Y_INTEGRAL;
-            return [radiance[0] * scale, radiance[1] * scale, radiance[2] * scale];
+        match wavelengths.basis {
+            Basis::Rgb => {
+                let scale = self.imaging_ratio * CIE_Y_INTEGRAL;
+                [radiance[0] * scale, radiance[1] * scale, radiance[2] * scale]
+            }
+            Basis::Spectral => self.response_to(radiance, wavelengths),
         }
+    }
+
+    #[inline]
+    fn response_to(&self, radiance: SampledSpectrum, wavelengths: &Wavelengths) -> [f32; 3] {
         let weighted = radiance.safe_div(wavelengths.pdf());
         let mut sum = [0.0f32; 4];
         for lane in 0..4 {

@@ -96,7 +96,7 @@ impl Conductor {
     }
 
     /// The fraction reflected by a facet at this angle, per lane.
-    #[inline]
+    #[inline(always)]
     pub fn fresnel(&self, cos_i: f32) -> SampledSpectrum {
         fresnel_conductor(cos_i, self.eta, self.k)
     }

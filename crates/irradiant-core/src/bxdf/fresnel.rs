@@ -55,13 +55,11 @@ pub fn fresnel_dielectric(cos_i: f32, eta: f32) -> f32 {
 /// The fraction of light reflected by a conductor of index `eta + i k` relative to the outside, per lane, in [0, 1].
 ///
 /// `cos_i` in [0, 1], from the facet normal.
-#[inline]
+#[inline(always)]
 pub fn fresnel_conductor(cos_i: f32, eta: SampledSpectrum, k: SampledSpectrum) -> SampledSpectrum {
-    let mut out = [0.0; 4];
-    for (lane, value) in out.iter_mut().enumerate() {
-        *value = fresnel_conductor_at(cos_i, eta.0[lane], k.0[lane]);
-    }
-    SampledSpectrum(out)
+    // Written out: loops over lanes are not taken for vectors inside loops over paths.
+    let at = |lane: usize| fresnel_conductor_at(cos_i, eta.0[lane], k.0[lane]);
+    SampledSpectrum([at(0), at(1), at(2), at(3)])
 }
 
 /// As [`fresnel_conductor`], of one lane.

@@ -3,7 +3,7 @@
 //! # Layout
 //! In reading order: this file ([`Camera`], [`CameraRay`]); `projective` (perspective and orthographic), `spherical`,
 //! `realistic` (through real glass: `lens`, its `exit_pupil`, its `aperture`); [`footprint`](FootprintEstimator) (how far
-//! apart neighbouring pixels are at a surface); `importance` (the camera as light meets it); `compile` (from the description).
+//! apart neighbouring pixels are at a surface); `lanes` (many rays side by side); `importance` (the camera as light meets it); `compile` (from the description).
 //!
 //! # Conventions
 //! Film positions are in pixels of the full image, (0, 0) at the top left corner, so pixel (x, y) covers x to x + 1. Camera
@@ -16,6 +16,7 @@ mod compile;
 mod exit_pupil;
 mod footprint;
 mod importance;
+mod lanes;
 mod lens;
 mod projective;
 mod realistic;
@@ -26,11 +27,12 @@ mod tests;
 pub use compile::{CompiledCamera, compile};
 pub use footprint::FootprintEstimator;
 pub use importance::CameraConnection;
+pub use lanes::CameraLanes;
 
 use crate::interaction::Interaction;
 use irradiant_math::elementary::lerp;
 use irradiant_math::{Affine, AnimatedTransform, Point2, Point3, Ray, Vec3};
-use projective::{Orthographic, Perspective};
+use projective::{FlatScreen, Orthographic, Perspective};
 use realistic::Realistic;
 use spherical::Spherical;
 
@@ -121,6 +123,14 @@ struct ModelRay {
     offsets: Option<Offsets>,
 }
 
+impl ModelRay {
+    /// What makes the direction a unit vector.
+    #[inline(always)]
+    fn inverse_length(&self) -> f32 {
+        1.0 / self.d.length()
+    }
+}
+
 impl Camera {
     /// The ray through a place on the film (pixels) and a place on the lens (unit square), at a fraction `time_u` of the
     /// shutter's interval. `None` where the lens lets nothing through.
@@ -143,7 +153,7 @@ impl Camera {
     }
 
     /// The shutter's time at a fraction of its interval.
-    #[inline]
+    #[inline(always)]
     pub fn time(&self, time_u: f32) -> f32 {
         lerp(time_u, self.shutter[0], self.shutter[1])
     }
@@ -166,7 +176,7 @@ impl Camera {
             moved(&mut ray, &motion.at(time));
         }
         // Neighbours of the normalised ray lie on the same lines when their offsets are scaled alike.
-        let inverse_length = 1.0 / ray.d.length();
+        let inverse_length = ray.inverse_length();
         let offsets = ray.offsets.map(|o| Offsets {
             origin_x: o.origin_x * footprint_scale,
             direction_x: o.direction_x * (footprint_scale * inverse_length),

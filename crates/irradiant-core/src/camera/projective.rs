@@ -53,6 +53,12 @@ fn lens_axes(lens: ThinLens, space_from_camera: &Transform) -> LensAxes {
         .then(|| [[lens.radius, 0.0, 0.0], [0.0, lens.radius, 0.0]].map(|v| vector(space_from_camera, v)))
 }
 
+/// A model whose rays go through a flat screen.
+pub(super) trait FlatScreen {
+    /// The ray through a place on the film and one on the lens. To be `#[inline(always)]`, for loops over many.
+    fn ray(&self, film: Point2, lens: Point2) -> ModelRay;
+}
+
 /// What both cameras have in common, for finding the place of a point on the film.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Screen {
@@ -68,7 +74,7 @@ pub(super) struct Screen {
     pub parallel: Option<Vec3>,
 }
 
-#[inline]
+#[inline(always)]
 fn on_lens(axes: &[Vec3; 2], u: Point2) -> Vec3 {
     let p = uniform_disk_concentric(u);
     axes[0] * p.x + axes[1] * p.y
@@ -118,9 +124,11 @@ impl Perspective {
         let Self { origin, corner, dx, dy, lens } = *self;
         Screen { origin, corner, dx, dy, lens, parallel: None }
     }
+}
 
-    #[inline]
-    pub fn ray(&self, film: Point2, lens: Point2) -> ModelRay {
+impl FlatScreen for Perspective {
+    #[inline(always)]
+    fn ray(&self, film: Point2, lens: Point2) -> ModelRay {
         let focus = self.corner + self.dx * film.x + self.dy * film.y;
         let offset = self.lens.as_ref().map_or(Vec3::ZERO, |axes| on_lens(axes, lens));
         ModelRay {
@@ -173,9 +181,11 @@ impl Orthographic {
         let (corner, parallel) = if lens.is_some() { (corner + forward, None) } else { (corner, Some(forward)) };
         Screen { origin, corner, dx, dy, lens, parallel }
     }
+}
 
-    #[inline]
-    pub fn ray(&self, film: Point2, lens: Point2) -> ModelRay {
+impl FlatScreen for Orthographic {
+    #[inline(always)]
+    fn ray(&self, film: Point2, lens: Point2) -> ModelRay {
         let start = self.corner + self.dx * film.x + self.dy * film.y;
         let Some(axes) = &self.lens else {
             let offsets = Offsets { origin_x: self.dx, origin_y: self.dy, ..Offsets::ZERO };

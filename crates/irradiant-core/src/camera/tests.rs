@@ -12,7 +12,7 @@ fn spanned<T>(value: T) -> Spanned<T> {
     Spanned::unplaced(value)
 }
 
-fn perspective(fov: f32, lens_radius: f32, focal_distance: f32) -> CameraKind {
+pub(super) fn perspective(fov: f32, lens_radius: f32, focal_distance: f32) -> CameraKind {
     CameraKind::Perspective {
         fov: spanned(fov),
         lens_radius: spanned(lens_radius),
@@ -22,7 +22,7 @@ fn perspective(fov: f32, lens_radius: f32, focal_distance: f32) -> CameraKind {
     }
 }
 
-fn orthographic(window: [f32; 4], lens_radius: f32, focal_distance: f32) -> CameraKind {
+pub(super) fn orthographic(window: [f32; 4], lens_radius: f32, focal_distance: f32) -> CameraKind {
     CameraKind::Orthographic {
         lens_radius: spanned(lens_radius),
         focal_distance: spanned(focal_distance),

@@ -3,6 +3,8 @@
 //! "Any split of the work, any number of threads, any resume gives the same file" rests on this: each sample is
 //! rounded once, to a multiple of the unit; integer addition does the rest.
 
+use std::ops::Range;
+
 /// Sum of `f32` samples in units of 2^-64. A sample's magnitude must be below 2^43; then 2^20 samples cannot overflow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(transparent)]
@@ -20,18 +22,49 @@ pub struct SquareSum(i128);
 /// Largest magnitude of one sample whose square is summed (exclusive).
 pub const SQUARE_LIMIT: f32 = (1u64 << 29) as f32;
 
-/// `mantissa * 2^exponent`, rounded half away from zero to an integer. A mantissa has 53 bits at most, so what is shifted to
-/// the right fits one word; `exponent < 100` where it has 24.
-#[inline]
-fn scaled(mantissa: u64, exponent: i32) -> i128 {
-    if exponent >= 0 {
-        (mantissa as i128) << exponent
-    } else if exponent > -64 {
-        let shift = -exponent as u32;
-        i128::from((mantissa + (1 << (shift - 1))) >> shift)
-    } else {
-        0
-    }
+/// `mantissa * 2^exponent`, rounded half away from zero to an integer, as its low and its high word: `mantissa` below 2^53, `exponent` below 64 + 40.
+/// Chooses, so that loops become vector code.
+#[inline(always)]
+fn scaled(mantissa: u64, exponent: i32) -> [u64; 2] {
+    // Shifts count modulo 64 in words: what is not meant is not chosen.
+    let (up, down) = (exponent as u32, exponent.wrapping_neg() as u32);
+    let rounded = mantissa.wrapping_add(1u64.wrapping_shl(down.wrapping_sub(1))).wrapping_shr(down);
+    let low = if exponent < 64 { mantissa.wrapping_shl(up) } else { 0 };
+    let carried = if exponent > 0 { mantissa.wrapping_shr(down) } else { 0 };
+    let low = if exponent >= 0 { low } else { rounded };
+    [if exponent > -64 { low } else { 0 }, if exponent < 64 { carried } else { mantissa.wrapping_shl(up) }]
+}
+
+/// Mantissa and exponent of a finite number's magnitude.
+#[inline(always)]
+fn parts(x: f32) -> (u64, i32) {
+    let bits = x.to_bits();
+    let biased = (bits >> 23 & 0xff) as i32;
+    let leading = if biased == 0 { 0 } else { 0x80_0000 };
+    (u64::from(bits & 0x7f_ffff | leading), biased.max(1) - 150)
+}
+
+/// A sample in units of [`ExactSum`], two's complement, low word first; its magnitude is below [`SAMPLE_LIMIT`].
+#[inline(always)]
+pub(super) fn sample_words(x: f32) -> [u64; 2] {
+    let (mantissa, exponent) = parts(x);
+    let [low, high] = scaled(mantissa, exponent + 64);
+    let sign = if x < 0.0 { u64::MAX } else { 0 };
+    let carry = if low == 0 { sign & 1 } else { 0 };
+    [(low ^ sign).wrapping_sub(sign), (high ^ sign).wrapping_add(carry)]
+}
+
+/// A sample's square in units of [`SquareSum`], low word first; its magnitude is below [`SQUARE_LIMIT`].
+#[inline(always)]
+pub(super) fn square_words(x: f32) -> [u64; 2] {
+    // Exact: 24 + 24 bits.
+    let (mantissa, exponent) = parts(x);
+    scaled(mantissa * mantissa, 2 * exponent + 48)
+}
+
+#[inline(always)]
+fn joined([low, high]: [u64; 2]) -> i128 {
+    (u128::from(high) << 64 | u128::from(low)) as i128
 }
 
 impl ExactSum {
@@ -54,11 +87,15 @@ impl ExactSum {
         if !(x.abs() < SAMPLE_LIMIT) {
             return None;
         }
-        let bits = x.to_bits();
-        let biased = (bits >> 23 & 0xff) as i32;
-        let mantissa = if biased == 0 { bits & 0x7f_ffff } else { bits & 0x7f_ffff | 0x80_0000 };
-        let magnitude = scaled(mantissa as u64, biased.max(1) - 150 + 64);
-        Some(Self(if x < 0.0 { -magnitude } else { magnitude }))
+        Some(Self(joined(sample_words(x))))
+    }
+
+    /// Adds the samples of some lanes, of which these are the [`sample_words`].
+    #[inline(always)]
+    pub(super) fn add_words<const N: usize>(&mut self, [low, high]: &[[u64; N]; 2], lanes: Range<usize>) {
+        for i in lanes {
+            self.0 += joined([low[i], high[i]]);
+        }
     }
 
     /// The sum, rounded to `f64`.
@@ -84,14 +121,16 @@ impl SquareSum {
         if !(x.abs() < SQUARE_LIMIT) {
             return false;
         }
-        // Exact in f64: 24 + 24 bits.
-        let square = x as f64 * x as f64;
-        let bits = square.to_bits();
-        let biased = (bits >> 52) as i32;
-        if biased != 0 {
-            self.0 += scaled(bits & ((1 << 52) - 1) | 1 << 52, biased - 1075 + 48);
-        }
+        self.0 += joined(square_words(x));
         true
+    }
+
+    /// Adds the samples of some lanes, of which these are the [`square_words`].
+    #[inline(always)]
+    pub(super) fn add_words<const N: usize>(&mut self, [low, high]: &[[u64; N]; 2], lanes: Range<usize>) {
+        for i in lanes {
+            self.0 += joined([low[i], high[i]]);
+        }
     }
 
     /// The sum, rounded to `f64`.

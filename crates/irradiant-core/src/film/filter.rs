@@ -2,6 +2,7 @@
 //! weight has mean 1 (Ernst et al. 2006). Weights are exactly 1 for filters without negative lobes.
 
 use irradiant_math::elementary::{exp, sin};
+use irradiant_math::lanes::{Floats, whole};
 use irradiant_math::{Point2, warp};
 use irradiant_scene::desc::{FilterDesc, FilterKind};
 use std::f32::consts::PI;
@@ -116,7 +117,7 @@ impl Filter {
     pub fn sample(&self, u: Point2) -> FilterSample {
         match self {
             Self::Box { radius } => {
-                FilterSample { offset: [radius[0] * (2.0 * u.x - 1.0), radius[1] * (2.0 * u.y - 1.0)], weight: 1.0 }
+                FilterSample { offset: [evenly(u.x, radius[0]), evenly(u.y, radius[1])], weight: 1.0 }
             }
             Self::Triangle { radius } => {
                 FilterSample { offset: [warp::tent(u.x, radius[0]), warp::tent(u.y, radius[1])], weight: 1.0 }
@@ -124,6 +125,31 @@ impl Filter {
             Self::Tabulated(profiles) => {
                 let ((x, wx), (y, wy)) = (profiles[0].sample(u.x), profiles[1].sample(u.y));
                 FilterSample { offset: [x, y], weight: wx * wy }
+            }
+        }
+    }
+
+    /// For `n` lanes offsets, in place of the numbers that draw them, and weights: those of [`Filter::sample`], to the bit. Tabulated profiles are
+    /// searched one after another.
+    #[inline(always)]
+    pub fn sample_lanes(&self, n: usize, [x, y]: &mut [Floats; 2], weight: &mut Floats) {
+        weight[whole(n)].fill(1.0);
+        match self {
+            Self::Box { radius } => {
+                for i in whole(n) {
+                    (x[i], y[i]) = (evenly(x[i], radius[0]), evenly(y[i], radius[1]));
+                }
+            }
+            Self::Triangle { radius } => {
+                for i in whole(n) {
+                    (x[i], y[i]) = (warp::tent(x[i], radius[0]), warp::tent(y[i], radius[1]));
+                }
+            }
+            Self::Tabulated(_) => {
+                for i in 0..n {
+                    let FilterSample { offset, weight: w } = self.sample(Point2::new(x[i], y[i]));
+                    (x[i], y[i], weight[i]) = (offset[0], offset[1], w);
+                }
             }
         }
     }
@@ -155,6 +181,12 @@ impl Filter {
     }
 }
 
+/// A point of [-radius, radius).
+#[inline(always)]
+fn evenly(u: f32, radius: f32) -> f32 {
+    radius * (2.0 * u - 1.0)
+}
+
 fn sinc(x: f32) -> f32 {
     let x = PI * x;
     if x.abs() < 1e-4 { 1.0 } else { sin(x) / x }
@@ -176,6 +208,8 @@ fn mitchell(x: f32, b: f32, c: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Kernel, Level};
+    use irradiant_math::lanes::LANES;
     use irradiant_scene::{Span, Spanned};
 
     fn filter(kind: FilterKind, radius: f32) -> Filter {
@@ -272,6 +306,37 @@ mod tests {
                 assert!((a - b).abs() < 0.05 * most, "{kind:?}: {a} {b}");
             }
             assert_eq!(filter.value([1.1 * radius, 0.0]), 0.0);
+        }
+    }
+
+    struct Draw<'a>(&'a Filter, &'a mut [Floats; 2], &'a mut Floats);
+
+    impl Kernel for Draw<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run(self) {
+            self.0.sample_lanes(N, self.1, self.2);
+        }
+    }
+
+    /// Not whole vectors.
+    const N: usize = 233;
+
+    #[test]
+    fn lanes_have_the_places_of_single_samples() {
+        let s = |x: f32| Spanned::unplaced(x);
+        let kinds = [FilterKind::Box, FilterKind::Triangle, FilterKind::Sinc { tau: s(3.0) }];
+        for filter in kinds.map(|kind| filter(kind, 1.7)) {
+            let mut rng = irradiant_testkit::Rng::new(1);
+            let drawn: [Floats; 2] = std::array::from_fn(|_| std::array::from_fn(|_| rng.next_f32()));
+            for level in Level::available() {
+                let (mut places, mut weight) = (drawn, [-7.0; LANES]);
+                level.run(Draw(&filter, &mut places, &mut weight));
+                for i in 0..N {
+                    let found = FilterSample { offset: [places[0][i], places[1][i]], weight: weight[i] };
+                    assert_eq!(found, filter.sample(Point2::new(drawn[0][i], drawn[1][i])), "{level:?}");
+                }
+            }
         }
     }
 

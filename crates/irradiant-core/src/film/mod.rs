@@ -7,6 +7,7 @@
 mod develop;
 pub mod exact;
 pub mod filter;
+mod lanes;
 mod parts;
 mod splat;
 

@@ -95,6 +95,8 @@ pub struct Sampler {
     samples_per_pixel: u32,
     log2_samples: u32,
     log2_size: u32,
+    /// The seed of `zsobol`'s first 2^32 points in the first 2^16 pixels each way: most samples'.
+    first_seed: u32,
     global: Option<Arc<SobolPixels>>,
     permutations: Arc<[DigitPermutations]>,
 }
@@ -184,6 +186,7 @@ impl Sampler {
             samples_per_pixel,
             log2_samples: samples_per_pixel.max(1).next_power_of_two().trailing_zeros(),
             log2_size,
+            first_seed: hash4(seed, 0, 0, 0) as u32,
             global: global.map(Arc::new),
             permutations,
         }
@@ -224,7 +227,11 @@ impl Sampler {
                 let along = morton_encode_2(x & 0xffff, y & 0xffff) as u64;
                 let index = (along << self.log2_samples) + index as u64;
                 // Beyond 2^32 points the sequence starts again, scrambled anew.
-                let seed = hash4(self.seed, index >> 32, (x >> 16) as u64, (y >> 16) as u64) as u32;
+                let beyond = [index >> 32, (x >> 16) as u64, (y >> 16) as u64];
+                let seed = match beyond {
+                    [0, 0, 0] => self.first_seed,
+                    [run, x, y] => hash4(self.seed, run, x, y) as u32,
+                };
                 Source::Padded {
                     reversed_index: (index as u32).reverse_bits(),
                     seed,

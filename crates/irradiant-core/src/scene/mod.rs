@@ -123,34 +123,33 @@ impl Scene {
     }
 
     /// The pixel filter's random numbers, or the pixel's centre where jitter is switched off.
-    #[inline]
+    #[inline(always)]
     pub fn film_draw(&self, u: Point2) -> Point2 {
         if self.pixel_jitter { u } else { Point2::new(0.5, 0.5) }
     }
 
     /// What the sensor makes of radiance: linear RGB of the film's colour space.
-    #[inline]
+    #[inline(always)]
     pub fn film_rgb(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
         self.film_rgb_of_response(self.sensor_response(radiance, lambda))
     }
 
     /// The first half of [`Scene::film_rgb`], linear in `radiance`: a sample's light may come in parts of different wavelengths.
-    #[inline]
+    #[inline(always)]
     pub fn sensor_response(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
         self.sensor.to_rgb(radiance, lambda)
     }
 
     /// The second half of [`Scene::film_rgb`], of a whole sample.
-    #[inline]
-    pub fn film_rgb_of_response(&self, mut sensor: [f32; 3]) -> [f32; 3] {
-        if self.max_component.is_finite() {
-            // Asked for by the scene; labelled as biased in the header.
-            let most = sensor[0].max(sensor[1]).max(sensor[2]);
-            if most > self.max_component {
-                sensor = sensor.map(|c| c * (self.max_component / most));
-            }
+    #[inline(always)]
+    pub fn film_rgb_of_response(&self, [r, g, b]: [f32; 3]) -> [f32; 3] {
+        if !self.max_component.is_finite() {
+            return self.rgb_from_sensor([r, g, b]);
         }
-        self.rgb_from_sensor(sensor)
+        // Asked for by the scene; labelled as biased in the header.
+        let most = r.max(g).max(b);
+        let factor = if most > self.max_component { self.max_component / most } else { 1.0 };
+        self.rgb_from_sensor([r * factor, g * factor, b * factor])
     }
 
     /// As [`Scene::film_rgb`], without the limit that the scene may set to a sample.
@@ -159,10 +158,11 @@ impl Scene {
         self.rgb_from_sensor(self.sensor.to_rgb(radiance, lambda))
     }
 
-    #[inline]
+    #[inline(always)]
     fn rgb_from_sensor(&self, sensor: [f32; 3]) -> [f32; 3] {
-        let m = &self.rgb_from_sensor;
-        std::array::from_fn(|i| m[i][0] * sensor[0] + m[i][1] * sensor[1] + m[i][2] * sensor[2])
+        let row = |m: &[f32; 3]| m[0] * sensor[0] + m[1] * sensor[1] + m[2] * sensor[2];
+        let [r, g, b] = &self.rgb_from_sensor;
+        [row(r), row(g), row(b)]
     }
 
     /// The factor that the scene's limit of the sensor's response (`maxcomponentvalue`; biased) puts on a sample of this
@@ -181,9 +181,7 @@ impl Scene {
     /// [`Scene::limit_factor`] of the whole sample, parts add up to [`Scene::film_rgb`] of the whole.
     #[inline]
     pub fn film_rgb_of_part(&self, radiance: SampledSpectrum, lambda: &Wavelengths) -> [f32; 3] {
-        let sensor = self.sensor.to_rgb(radiance, lambda);
-        let m = &self.rgb_from_sensor;
-        std::array::from_fn(|i| m[i][0] * sensor[0] + m[i][1] * sensor[1] + m[i][2] * sensor[2])
+        self.sensor_rgb(radiance, lambda)
     }
 
     /// The spectrum that the film shows as (1, 1, 1).

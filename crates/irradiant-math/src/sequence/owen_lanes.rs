@@ -1,7 +1,7 @@
 //! The blocks of many samples side by side: [`owen_sobol_4d`](super::owen_sobol_4d) without tables, which vectors would have to look up
 //! lane by lane.
 //!
-//! 8 ns a block with AVX-512, 12 ns with AVX2, where one at a time takes 20 to 40 ns (Xeon 4th generation, a busy machine).
+//! 8 ns a whole block with AVX-512, 12 ns with AVX2, where one at a time takes 20 to 40 ns (Xeon 4th generation, a busy machine).
 
 use super::laine_karras;
 use super::owen::block_seeds;
@@ -10,9 +10,26 @@ use crate::hash::{mix32, unit_f32};
 use crate::lanes::{Floats, LANES, whole};
 
 /// For each of `n` lanes what [`owen_sobol_4d_of_reversed`](super::owen_sobol_4d_of_reversed) gives, to the bit, for its seed mixed with
-/// `block`.
+/// `block`. Of the third and the fourth numbers only those that are `asked` for, which take most of the time; what was there stays.
 #[inline(always)]
 pub fn owen_sobol_4d_lanes(
+    n: usize,
+    reversed_indices: &[u32; LANES],
+    seeds: &[u32; LANES],
+    block: u32,
+    asked: [bool; 2],
+    out: &mut [Floats; 4],
+) {
+    match asked {
+        [false, false] => lanes::<false, false>(n, reversed_indices, seeds, block, out),
+        [false, true] => lanes::<false, true>(n, reversed_indices, seeds, block, out),
+        [true, false] => lanes::<true, false>(n, reversed_indices, seeds, block, out),
+        [true, true] => lanes::<true, true>(n, reversed_indices, seeds, block, out),
+    }
+}
+
+#[inline(always)]
+fn lanes<const THIRD: bool, const FOURTH: bool>(
     n: usize,
     reversed_indices: &[u32; LANES],
     seeds: &[u32; LANES],
@@ -21,29 +38,24 @@ pub fn owen_sobol_4d_lanes(
 ) {
     let block = block.wrapping_mul(0x9e37_79b9);
     for i in whole(n) {
-        let [a, b, c, d] = straight(reversed_indices[i], mix32(seeds[i] ^ block));
-        (out[0][i], out[1][i], out[2][i], out[3][i]) = (a, b, c, d);
+        let seeds = block_seeds(mix32(seeds[i] ^ block));
+        let v = laine_karras(reversed_indices[i], seeds[4]);
+        // The first reversed coordinate is the index itself, the second Pascal's triangle times it; see `owen_sobol_2d`.
+        let x = reversed(v);
+        let y = x ^ (x >> 1 & 0x5555_5555);
+        let y = y ^ (y >> 2 & 0x3333_3333);
+        let y = y ^ (y >> 4 & 0x0f0f_0f0f);
+        let y = y ^ (y >> 8 & 0x00ff_00ff);
+        let y = y ^ y >> 16;
+        let point = |v, seed| unit_f32(reversed(laine_karras(v, seed)));
+        (out[0][i], out[1][i]) = (point(x, seeds[0]), point(y, seeds[1]));
+        if THIRD {
+            out[2][i] = point(multiplied(v, &REVERSED_COLUMNS[0]), seeds[2]);
+        }
+        if FOURTH {
+            out[3][i] = point(multiplied(v, &REVERSED_COLUMNS[1]), seeds[3]);
+        }
     }
-}
-
-#[inline(always)]
-fn straight(reversed_index: u32, seed: u32) -> [f32; 4] {
-    let seeds = block_seeds(seed);
-    let v = laine_karras(reversed_index, seeds[4]);
-    // The first reversed coordinate is the index itself, the second Pascal's triangle times it; see `owen_sobol_2d`.
-    let x = reversed(v);
-    let y = x ^ (x >> 1 & 0x5555_5555);
-    let y = y ^ (y >> 2 & 0x3333_3333);
-    let y = y ^ (y >> 4 & 0x0f0f_0f0f);
-    let y = y ^ (y >> 8 & 0x00ff_00ff);
-    let y = y ^ y >> 16;
-    let point = |v, seed| unit_f32(reversed(laine_karras(v, seed)));
-    [
-        point(x, seeds[0]),
-        point(y, seeds[1]),
-        point(multiplied(v, &REVERSED_COLUMNS[0]), seeds[2]),
-        point(multiplied(v, &REVERSED_COLUMNS[1]), seeds[3]),
-    ]
 }
 
 /// The xor of the columns of the set bits.
@@ -85,11 +97,15 @@ mod tests {
         for block in 0..50u32 {
             let indices: [u32; LANES] = std::array::from_fn(|i| if i % 3 == 0 { i as u32 } else { rng.next_u32() });
             let seeds: [u32; LANES] = std::array::from_fn(|_| rng.next_u32());
-            let mut out = [[0.0; LANES]; 4];
-            owen_sobol_4d_lanes(LANES, &indices, &seeds, block, &mut out);
-            for i in 0..LANES {
-                let single = owen_sobol_4d_of_reversed(indices[i], mix32(seeds[i] ^ block.wrapping_mul(0x9e37_79b9)));
-                assert_eq!([0, 1, 2, 3].map(|d| out[d][i]), single, "{block} {i}");
+            for asked in [[false, false], [false, true], [true, false], [true, true]] {
+                let mut out = [[-1.0; LANES]; 4];
+                owen_sobol_4d_lanes(LANES, &indices, &seeds, block, asked, &mut out);
+                for i in 0..LANES {
+                    let seed = mix32(seeds[i] ^ block.wrapping_mul(0x9e37_79b9));
+                    let [a, b, c, d] = owen_sobol_4d_of_reversed(indices[i], seed);
+                    let expected = [a, b, if asked[0] { c } else { -1.0 }, if asked[1] { d } else { -1.0 }];
+                    assert_eq!([0, 1, 2, 3].map(|d| out[d][i]), expected, "{block} {i} {asked:?}");
+                }
             }
         }
     }

@@ -221,10 +221,13 @@ impl SharedPathIntegrator {
                         continue;
                     }
                     stats.paths += 1;
+                    let CameraSample { camera_ray, filter_weight, .. } = member.sample;
+                    let camera_weight = camera_ray.map(|ray| ray.weight);
                     if !tile.add(
                         x,
                         y,
-                        film_rgb(scene, &member.sample, &member.lambda, member.radiance, member.shared),
+                        film_rgb(scene, camera_weight, &member.lambda, member.radiance, member.shared)
+                            .map(|c| c * filter_weight),
                         &scratch.layers[i * channels..(i + 1) * channels],
                     ) {
                         stats.refuse(x, y, index);
@@ -584,18 +587,17 @@ fn samples_of_block<'a>(
     })
 }
 
-/// What the film gets of a sample: of its own radiance at its wavelengths, and of what the sensor makes of light that is shared.
+/// What the film gets of a sample, but for the filter's weight: of its own radiance at its wavelengths, and of what the sensor makes of light that
+/// is shared.
 fn film_rgb(
     scene: &Scene,
-    sample: &CameraSample,
+    camera_weight: Option<f32>,
     lambda: &Wavelengths,
     radiance: SampledSpectrum,
     shared: [f32; 3],
 ) -> [f32; 3] {
-    let Some(camera_ray) = &sample.camera_ray else { return [0.0; 3] };
-    let [r, g, b] = scene.sensor_response(radiance * camera_ray.weight, lambda);
+    let Some(weight) = camera_weight else { return [0.0; 3] };
+    let [r, g, b] = scene.sensor_response(radiance * weight, lambda);
     let [more_r, more_g, more_b] = shared;
-    let weight = camera_ray.weight;
-    let [r, g, b] = scene.film_rgb_of_response([r + more_r * weight, g + more_g * weight, b + more_b * weight]);
-    [r * sample.filter_weight, g * sample.filter_weight, b * sample.filter_weight]
+    scene.film_rgb_of_response([r + more_r * weight, g + more_g * weight, b + more_b * weight])
 }

@@ -3,7 +3,7 @@
 use super::PIXELS;
 use super::blocks::{Blocks, Model, Receivers, Sixteen, Spectra, Three, set_spectrum, spectrum};
 use super::sky::{GLIMPSES, Glimpse, ROUNDS, SharedSky};
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::geometry::Kernel;
@@ -156,7 +156,7 @@ impl Outlooks {
         &mut self,
         scene: &Scene,
         sky: &SharedSky,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {

@@ -7,7 +7,7 @@ use super::blocks::{
 use super::sky::SharedSky;
 use super::sky_lanes::Outlooks;
 use super::{Incoming, PIXELS, blocks_of, film_rgb, pixels_of};
-use crate::camera_samples::{CameraSample, SampleBatch};
+use crate::camera_samples::{BatchSample, SampleBatch};
 use crate::integrator::{RenderStats, Renderer};
 use crate::path::PathIntegrator;
 use crate::staged_path::{Batch, Plain};
@@ -34,15 +34,16 @@ struct Joints {
 
 /// Takes units' samples, many at a time, of a scene that has stages for `path`.
 pub(super) fn renderer<'a>(path: PathIntegrator, sky_tests: u32, scene: &'a Scene) -> Renderer<'a> {
-    let (mut batch, mut samples) = (Batch::new(scene), SampleBatch::new(scene));
+    let (mut batch, mut samples) = (Batch::new(scene), SampleBatch::new());
     let (mut blocks, mut joints, mut outlooks) = (Blocks::new(), Joints::new(), Outlooks::new());
     let sky = SharedSky::of(scene, &path, sky_tests);
     Box::new(move |unit, tile, stats| {
-        let mut take = |samples: &mut SampleBatch<'a>| {
+        let mut take = |samples: &mut SampleBatch| {
             samples.trace(scene, PIXELS);
-            let (samples, hits) = samples.traced();
-            stats.camera_rays += samples.iter().filter(|sample| sample.camera_ray.is_some()).count() as u64;
-            path.shared_batch(&mut batch, scene, sky.as_ref(), samples, hits, &mut blocks, stats);
+            let (samples, begin) = samples.traced();
+            let hits = begin.hits;
+            stats.camera_rays += samples.iter().filter(|sample| sample.camera_weight.is_some()).count() as u64;
+            path.shared_batch(&mut batch, scene, sky.as_ref(), samples, begin, &mut blocks, stats);
             if let Some(sky) = &sky {
                 outlooks.share(scene, sky, samples, &mut blocks, stats);
             }
@@ -55,7 +56,8 @@ pub(super) fn renderer<'a>(path: PathIntegrator, sky_tests: u32, scene: &'a Scen
                 stats.paths += 1;
                 let [r, g, b] = &joints.shared[s / PIXELS];
                 let shared = [r[s % PIXELS], g[s % PIXELS], b[s % PIXELS]];
-                let rgb = film_rgb(scene, sample, &sample.lambda, blocks.own[s], shared);
+                let rgb = film_rgb(scene, sample.camera_weight, &sample.lambda, blocks.own[s], shared)
+                    .map(|c| c * sample.filter_weight);
                 if !tile.add(x, y, rgb, &[]) {
                     stats.refuse(x, y, sample.index);
                 }
@@ -68,7 +70,7 @@ pub(super) fn renderer<'a>(path: PathIntegrator, sky_tests: u32, scene: &'a Scen
         for block in blocks_of(&unit.bounds) {
             for index in unit.samples.clone() {
                 for pixel in pixels_of(&block) {
-                    n = samples.put(scene, pixel, index);
+                    n = samples.put(scene, pixel, index..index + 1);
                 }
                 if n == together {
                     take(&mut samples);
@@ -98,7 +100,7 @@ impl Joints {
     fn share(
         &mut self,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         hits: &[Option<Hit>],
         blocks: &mut Blocks,
         stats: &mut RenderStats,
@@ -144,7 +146,7 @@ impl Joints {
     }
 
     /// Joins one second vertex, if there is one, to its block's first ones.
-    fn join(&mut self, scene: &Scene, samples: &[CameraSample], hits: &[Option<Hit>], blocks: &mut Blocks, s: usize) {
+    fn join(&mut self, scene: &Scene, samples: &[BatchSample], hits: &[Option<Hit>], blocks: &mut Blocks, s: usize) {
         let Some(second) = &blocks.seconds[s] else { return };
         let (begin, own) = (s / PIXELS * PIXELS, s % PIXELS);
         let receivers = &mut blocks.receivers[s / PIXELS];
@@ -215,19 +217,20 @@ impl Joints {
 /// for another path's wavelengths.
 fn scattered_at(
     scene: &Scene,
-    sample: &CameraSample,
+    sample: &BatchSample,
     hit: Option<&Hit>,
     place: &mut Option<(Interaction, TextureContext)>,
     lambda: &Wavelengths,
     wi: Vec3,
 ) -> Option<(SampledSpectrum, f32)> {
-    let camera_ray = sample.camera_ray.as_ref()?;
     if place.is_none() {
+        let camera_ray = sample.camera_ray(scene)?;
         let at = scene.geometry.interaction(&camera_ray.ray, hit?);
-        *place = Some((at, scene.texture_context(&at, Some(camera_ray))));
+        *place = Some((at, scene.texture_context(&at, Some(&camera_ray))));
     }
     let (at, footprint) = place.as_ref()?;
-    let (mix, mut lambda) = (sample.stream.mix(0), *lambda);
+    let stream = sample.stream(scene);
+    let (mix, mut lambda) = (stream.mix(0), *lambda);
     let bsdf = scene.materials.bsdf(at.material, &scene.textures, at, footprint, &mut lambda, mix)?;
     let (f, pdf) = bsdf.f_and_pdf(at.wo, wi, TransportMode::Radiance);
     Some((f * bsdf.abs_cos(wi), pdf))

@@ -1,10 +1,10 @@
 //! The numbers of many paths side by side, between vertices and at them.
 
-use super::kernels::{PlacesOfBounces, PlacesOfCamera, Scatter};
-use crate::camera_samples::CameraSample;
+use super::kernels::{Numbers, PlacesOfBounces, PlacesOfCamera, Scatter};
+use super::lamps::{PlainLamp, has_one_light};
+use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
-use irradiant_core::bxdf::conductor::MirrorLobe;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
 use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
@@ -15,8 +15,7 @@ use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
 use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
-use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
-use std::f32::consts::FRAC_1_PI;
+use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 
 /// How a path's vertex scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +80,35 @@ pub(super) fn nowhere() -> TextureContext {
     TextureContext::without_footprint(Point3::ZERO, Normal3::ZERO, Point2::ZERO, 0)
 }
 
+/// A spectrum each, an array for each of its lanes.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct SpectrumLanes(pub [Floats; N_WAVELENGTHS]);
+
+impl SpectrumLanes {
+    const ZERO: Self = Self([[0.0; LANES]; N_WAVELENGTHS]);
+
+    /// Of a path.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> SampledSpectrum {
+        let [a, b, c, d] = &self.0;
+        SampledSpectrum([a[i], b[i], c[i], d[i]])
+    }
+
+    /// Sets that of a path.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, spectrum: SampledSpectrum) {
+        let [a, b, c, d] = &mut self.0;
+        [a[i], b[i], c[i], d[i]] = spectrum.0;
+    }
+
+    /// That of lane `from` goes to lane `to`.
+    #[inline(always)]
+    pub fn shift(&mut self, to: usize, from: usize) {
+        self.set(to, self.at(from));
+    }
+}
+
 /// What the paths of a batch carry, side by side.
 #[repr(C, align(64))]
 pub(crate) struct Batch {
@@ -94,7 +122,7 @@ pub(crate) struct Batch {
     pub(super) specular: [bool; LANES],
     /// Strata of the choice of a light at the last vertex, the same for all.
     pub(super) light_splits: u32,
-    pub(super) throughput: [SampledSpectrum; LANES],
+    pub(super) throughput: SpectrumLanes,
     pub(super) roulette_scale: Floats,
     /// Rays to the next vertices.
     pub(super) rays: [Ray; LANES],
@@ -110,12 +138,12 @@ pub(crate) struct Batch {
     pub(super) triangles: TriangleLanes,
     pub(super) at: SurfaceLanes,
     pub(super) scattering: [Scattering; LANES],
-    pub(super) reflectance: [SampledSpectrum; LANES],
-    pub(super) metals: [Conductor; LANES],
+    pub(super) reflectance: SpectrumLanes,
+    /// The indices of metals.
+    pub(super) eta: SpectrumLanes,
+    pub(super) k: SpectrumLanes,
     pub(super) is_metal: [u32; LANES],
     pub(super) alphas: [Floats; 2],
-    /// Of the last directions asked for: cosine with the facet, value, density.
-    pub(super) lobes: [Floats; 3],
     pub(super) bsdfs: Vec<Bsdf>,
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
@@ -126,6 +154,8 @@ pub(crate) struct Batch {
     // Light samples.
     /// Paths that look for light.
     pub(super) seeking: Vec<u32>,
+    /// What is known of each light.
+    pub(super) known_lamps: Vec<Option<PlainLamp>>,
     pub(super) tree: TreeLanes,
     /// The lights that were picked.
     pub(super) picked: [u32; LANES],
@@ -138,15 +168,15 @@ pub(crate) struct Batch {
     pub(super) sky: SkyLanes,
     pub(super) targets: TargetLanes,
     pub(super) is_delta: [u32; LANES],
-    pub(super) arriving: [SampledSpectrum; LANES],
+    pub(super) arriving: SpectrumLanes,
     /// The chance with which the light was picked; 0 where none is sampled.
     pub(super) pmf: Floats,
     /// How often the light is sampled at the vertex on average, and the share of all samples that this one stands for.
     pub(super) light_times: Floats,
     pub(super) light_share: Floats,
-    /// The cosine where it is scattered, and the weight of the sample over its density.
-    pub(super) light_cosine: Floats,
-    pub(super) light_factor: Floats,
+    /// What the light brings to the sample, but for what is in the way, and whether it is to be counted: of diffuse surfaces and metals.
+    pub(super) brought: SpectrumLanes,
+    pub(super) brings: [u32; LANES],
     /// Paths whose light samples are drawn alone, and their way to the sky.
     pub(super) light_alone: Vec<(u32, Option<PixelLine>)>,
     pub(super) light_runs: Vec<Option<PixelRun>>,
@@ -167,10 +197,13 @@ pub(crate) struct Batch {
     pub(super) next_o: Triples,
     pub(super) next_d: Triples,
     pub(super) next_pdf: Floats,
-    /// cos / pdf; negative where nothing is scattered.
-    pub(super) next_factor: Floats,
+    /// f cos / pdf, and whether anything is scattered.
+    pub(super) next_weight: SpectrumLanes,
+    pub(super) goes_on: [u32; LANES],
     /// Where on the sky's image directions lead to.
     pub(super) places: [Floats; 2],
+    /// What the scale of roulette is multiplied with.
+    pub(super) next_scale: Floats,
 }
 
 const NO_LAMP: u32 = u32::MAX;
@@ -187,7 +220,7 @@ impl Batch {
             bsdf_pdf: [0.0; LANES],
             specular: [false; LANES],
             light_splits: 1,
-            throughput: [SampledSpectrum::ZERO; LANES],
+            throughput: SpectrumLanes::ZERO,
             roulette_scale: [0.0; LANES],
             rays: [Ray::new(Point3::ZERO, Vec3::Z, 0.0); LANES],
             met: [None; LANES],
@@ -198,16 +231,17 @@ impl Batch {
             triangles: TriangleLanes::NONE,
             at: SurfaceLanes::ZERO,
             scattering: [Scattering::Gone; LANES],
-            reflectance: [SampledSpectrum::ZERO; LANES],
-            metals: [Conductor::new(SampledSpectrum::ONE, SampledSpectrum::ONE, Ggx::SMOOTH); LANES],
+            reflectance: SpectrumLanes::ZERO,
+            eta: SpectrumLanes::ZERO,
+            k: SpectrumLanes::ZERO,
             is_metal: [0; LANES],
             alphas: [[1.0; LANES]; 2],
-            lobes: [[0.0; LANES]; 3],
             bsdfs: Vec::new(),
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
             lamps_met: Vec::new(),
             seeking: Vec::new(),
+            known_lamps: PlainLamp::all(scene),
             tree: TreeLanes::NONE,
             picked: [0; LANES],
             rectangles: RectangleLanes::NONE,
@@ -218,12 +252,12 @@ impl Batch {
             sky: SkyLanes::NONE,
             targets: TargetLanes::NONE,
             is_delta: [0; LANES],
-            arriving: [SampledSpectrum::ZERO; LANES],
+            arriving: SpectrumLanes::ZERO,
             pmf: [0.0; LANES],
             light_times: [0.0; LANES],
             light_share: [0.0; LANES],
-            light_cosine: [0.0; LANES],
-            light_factor: [0.0; LANES],
+            brought: SpectrumLanes::ZERO,
+            brings: [0; LANES],
             light_alone: Vec::new(),
             light_runs: Vec::new(),
             light_picks: Vec::new(),
@@ -237,25 +271,29 @@ impl Batch {
             next_o: Triples::ZERO,
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
-            next_factor: [0.0; LANES],
+            next_weight: SpectrumLanes::ZERO,
+            goes_on: [0; LANES],
             places: [[0.0; LANES]; 2],
+            next_scale: [1.0; LANES],
         })
     }
 
     /// Puts the camera rays of some samples into lanes, whose first hits are known. How many there are.
-    pub fn begin(&mut self, scene: &Scene, samples: &[CameraSample], hits: &[Option<Hit>]) -> usize {
+    pub fn begin(&mut self, scene: &Scene, samples: &[BatchSample], begin: &Beginnings) -> usize {
+        self.o.copy(samples.len(), &begin.rays.o);
+        self.d.copy(samples.len(), &begin.rays.d);
+        self.time = begin.rays.time;
+        self.streams.clone_from(begin.streams);
         let mut n = 0;
         for (s, sample) in samples.iter().enumerate() {
-            let Some(camera_ray) = &sample.camera_ray else { continue };
-            let ray = &camera_ray.ray;
-            self.o.set(n, ray.o.to_array());
-            self.d.set(n, ray.d.to_array());
-            self.time[n] = ray.time;
-            self.streams.set(n, &sample.stream);
-            (self.throughput[n], self.roulette_scale[n]) = (SampledSpectrum::ONE, 1.0);
-            (self.met[n], self.sample[n]) = (hits[s], s as u32);
-            n += 1;
+            (self.met[s], self.sample[s]) = (begin.hits[s], s as u32);
+            if sample.camera_weight.is_some() {
+                self.shift(n, s);
+                n += 1;
+            }
         }
+        self.throughput.0.iter_mut().for_each(|lane| lane[..n].fill(1.0));
+        self.roulette_scale[..n].fill(1.0);
         self.escape_place[..n].fill(None);
         if let Some((_, sky)) = scene.lights.sky()
             && self.met[..n].iter().any(Option::is_none)
@@ -295,7 +333,7 @@ impl Batch {
             }
         });
         Walk {
-            throughput: self.throughput[i],
+            throughput: self.throughput.at(i),
             depth,
             roulette_scale: self.roulette_scale[i],
             previous,
@@ -319,7 +357,7 @@ impl Batch {
         self.previous.iter_mut().for_each(|t| t.shift(to, from));
         self.bsdf_pdf[to] = self.bsdf_pdf[from];
         self.specular[to] = self.specular[from];
-        self.throughput[to] = self.throughput[from];
+        self.throughput.shift(to, from);
         self.roulette_scale[to] = self.roulette_scale[from];
         self.met[to] = self.met[from];
         self.escape_place[to] = self.escape_place[from];
@@ -351,28 +389,40 @@ impl Batch {
         self.is_metal[first..first + WHOLE].iter().fold(0, |any, metal| any | metal) != 0
     }
 
+    /// What light from a lane's sample brings, where the surface scatters `f` of it and finds its direction with the density `pdf`; and whether
+    /// it is to be counted.
     #[inline(always)]
-    pub fn set_lobe(&mut self, i: usize, lobe: &MirrorLobe) {
-        (self.lobes[0][i], self.lobes[1][i], self.lobes[2][i]) = (lobe.cos, lobe.value, lobe.pdf);
+    pub fn bring(&self, i: usize, f: SampledSpectrum, pdf: f32) -> (SampledSpectrum, bool) {
+        let light = self.throughput.at(i) * f * self.arriving.at(i) * self.light_weight(i, pdf);
+        (light, !f.is_black() & !self.arriving.at(i).is_black() & f.is_finite())
     }
 
-    /// What a lane's metal scatters in the direction last asked for, without cosine.
-    #[inline]
-    pub fn metal_f(&self, i: usize) -> SampledSpectrum {
-        self.metals[i].fresnel(self.lobes[0][i]) * self.lobes[1][i]
+    /// A lane's metal.
+    #[inline(always)]
+    pub fn metal(&self, i: usize) -> Conductor {
+        Conductor::new(self.eta.at(i), self.k.at(i), self.facets(i))
+    }
+
+    /// Its facets.
+    #[inline(always)]
+    pub fn facets(&self, i: usize) -> Ggx {
+        Ggx::new(self.alphas[0][i], self.alphas[1][i])
     }
 
     /// Makes a lane's surface scatter so.
     #[inline(always)]
     pub fn set_metal(&mut self, i: usize, metal: Conductor) {
         let [x, y] = metal.facets().alphas();
-        (self.metals[i], self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (metal, 1, x, y);
+        let (eta, k) = metal.index();
+        self.eta.set(i, eta);
+        self.k.set(i, k);
+        (self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (1, x, y);
         self.scattering[i] = Scattering::Metal;
     }
 
     #[inline(always)]
     pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
-        self.reflectance[i] = reflectance;
+        self.reflectance.set(i, reflectance);
         self.scattering[i] = Scattering::Diffuse;
     }
 
@@ -398,111 +448,110 @@ impl Batch {
     pub fn bsdf(&self, i: usize) -> Bsdf {
         match self.scattering[i] {
             Scattering::Alone(k) => self.bsdfs[k as usize],
-            Scattering::Metal => Bsdf::new(self.at.frame(i), Bxdf::Conductor(self.metals[i])),
+            Scattering::Metal => Bsdf::new(self.at.frame(i), Bxdf::Conductor(self.metal(i))),
             Scattering::Diffuse | Scattering::Gone => {
-                Bsdf::new(self.at.frame(i), Bxdf::Diffuse(Diffuse::new(self.reflectance[i])))
+                Bsdf::new(self.at.frame(i), Bxdf::Diffuse(Diffuse::new(self.reflectance.at(i))))
             }
         }
     }
 
-    /// Draws directions in lanes, and the rays that go there.
+    /// Draws the numbers of vertices that are known, those for roulette only where it is played.
+    pub fn draw(&mut self, n: usize, depth: u32, scene: &Scene, roulette: bool) {
+        let (pick, lobe) = (!has_one_light(scene), !self.bsdfs.is_empty());
+        scene.geometry.level().run(Numbers { batch: self, n, depth, pick, lobe, roulette });
+    }
+
+    /// Draws directions, and the rays that go there.
     pub fn scatter(&mut self, n: usize, scene: &Scene) {
         let level = scene.geometry.level();
         level.run(Scatter(self, n));
+        self.next_scale[..n].fill(1.0);
+        self.specular[..n].fill(false);
+        for i in 0..n {
+            match self.scattering[i] {
+                Scattering::Diffuse | Scattering::Metal => {}
+                Scattering::Alone(k) => self.goes_on[i] = u32::from(self.scatter_alone(i, k as usize)),
+                Scattering::Gone => self.goes_on[i] = 0,
+            }
+        }
         if let Some((_, sky)) = scene.lights.sky() {
             level.run(PlacesOfBounces(self, n, sky));
         }
     }
 
-    /// The direction that a lane's path takes, if there is one: drawn in lanes where the vertex is plain.
-    #[inline(always)]
-    pub fn turn(&self, i: usize) -> Option<Turn> {
-        let plain = |weight: SampledSpectrum| Turn {
-            weight,
-            scale: 1.0,
-            wi: self.next_d.vector(i),
-            o: self.next_o.point(i),
-            pdf: self.next_pdf[i],
-            specular: false,
+    /// Draws the direction of a model of its own. Whether there is one.
+    fn scatter_alone(&mut self, i: usize, k: usize) -> bool {
+        let (bsdf, wo) = (&self.bsdfs[k], self.at.wo.vector(i));
+        let [_, _, lobe, _] = &self.scatter.0;
+        let sample = bsdf.sample(wo, lobe[i], self.scatter.uv(i), TransportMode::Radiance, Sides::All);
+        let Some(sample) = sample else { return false };
+        let (wi, specular) = (sample.wi, sample.lobe.is_specular());
+        self.next_weight.set(i, sample.f * (wi.dot(bsdf.frame.z).abs() / sample.pdf));
+        self.next_scale[i] = if sample.lobe.is_transmissive() { sample.eta * sample.eta } else { 1.0 };
+        self.next_pdf[i] = if sample.pdf_is_proportional && !specular {
+            bsdf.pdf(wo, wi, TransportMode::Radiance, Sides::All)
+        } else {
+            sample.pdf
         };
-        match self.scattering[i] {
-            Scattering::Gone => None,
-            Scattering::Diffuse => {
-                let f = self.reflectance[i] * FRAC_1_PI;
-                (!(f.is_black() || self.next_factor[i] < 0.0)).then(|| plain(f * self.next_factor[i]))
+        self.specular[i] = specular;
+        let o = offset_ray_origin(self.at.p.point(i), self.at.p_error.vector(i), self.at.n.normal(i), wi);
+        self.next_o.set(i, o.to_array());
+        self.next_d.set(i, wi.to_array());
+        true
+    }
+
+    /// For each path to which a direction was given: by what its throughput and the scale of roulette would be, `carry` says what they are, or
+    /// that it ends.
+    pub fn carry(
+        &mut self,
+        n: usize,
+        mut carry: impl FnMut(&Self, usize, SampledSpectrum, f32) -> Option<(SampledSpectrum, f32)>,
+    ) {
+        for i in 0..n {
+            if self.goes_on[i] == 0 {
+                continue;
             }
-            Scattering::Metal => {
-                if self.next_factor[i] < 0.0 {
-                    return None;
+            let throughput = self.throughput.at(i) * self.next_weight.at(i);
+            match carry(self, i, throughput, self.roulette_scale[i] * self.next_scale[i]) {
+                Some((throughput, scale)) => {
+                    self.throughput.set(i, throughput);
+                    self.roulette_scale[i] = scale;
                 }
-                let f = self.metal_f(i);
-                (!f.is_black() && f.is_finite()).then(|| plain(f * self.next_factor[i]))
-            }
-            Scattering::Alone(k) => {
-                let (bsdf, wo) = (&self.bsdfs[k as usize], self.at.wo.vector(i));
-                let [_, _, lobe, _] = &self.scatter.0;
-                let sample = bsdf.sample(wo, lobe[i], self.scatter.uv(i), TransportMode::Radiance, Sides::All)?;
-                let (wi, specular) = (sample.wi, sample.lobe.is_specular());
-                Some(Turn {
-                    weight: sample.f * (wi.dot(bsdf.frame.z).abs() / sample.pdf),
-                    scale: if sample.lobe.is_transmissive() { sample.eta * sample.eta } else { 1.0 },
-                    wi,
-                    o: offset_ray_origin(self.at.p.point(i), self.at.p_error.vector(i), self.at.n.normal(i), wi),
-                    pdf: if sample.pdf_is_proportional && !specular {
-                        bsdf.pdf(wo, wi, TransportMode::Radiance, Sides::All)
-                    } else {
-                        sample.pdf
-                    },
-                    specular,
-                })
+                None => self.goes_on[i] = 0,
             }
         }
     }
 
-    /// The path at the vertex of lane `from` goes on its way in lane `to`, with what it carries now; what it meets is not known yet.
-    #[inline(always)]
-    pub fn leave(
-        &mut self,
-        to: usize,
-        from: usize,
-        turn: &Turn,
-        throughput: SampledSpectrum,
-        roulette_scale: f32,
-        scene: &Scene,
-    ) {
-        let [p, p_error, n, ns] = &mut self.previous;
-        p.set(to, self.at.p.point(from).to_array());
-        p_error.set(to, self.at.p_error.vector(from).to_array());
-        n.set(to, self.at.n.normal(from).to_array());
-        ns.set(to, self.at.ns.normal(from).to_array());
-        (self.bsdf_pdf[to], self.specular[to]) = (turn.pdf, turn.specular);
-        (self.throughput[to], self.roulette_scale[to]) = (throughput, roulette_scale);
-        let ray = Ray::new(turn.o, turn.wi, self.time[from]);
-        self.o.set(to, ray.o.to_array());
-        self.d.set(to, ray.d.to_array());
-        (self.time[to], self.rays[to]) = (ray.time, ray);
-        self.streams.shift(to, from);
-        self.sample[to] = self.sample[from];
-        self.escape_place[to] = match self.scattering[from] {
-            Scattering::Alone(_) => scene.lights.place_of_escape(turn.wi),
-            Scattering::Diffuse | Scattering::Metal | Scattering::Gone => {
-                scene.lights.sky().map(|(_, sky)| self.place(from, sky))
-            }
-        };
+    /// How many paths go on.
+    pub fn count_going(&self, n: usize) -> u64 {
+        u64::from(self.goes_on[..n].iter().sum::<u32>())
     }
-}
 
-/// A direction that a path takes from a vertex.
-pub(crate) struct Turn {
-    /// What the throughput is multiplied with: f cos / pdf.
-    pub weight: SampledSpectrum,
-    /// What the scale of roulette is multiplied with.
-    pub scale: f32,
-    /// The direction, unit.
-    pub wi: Vec3,
-    /// Where the ray begins.
-    pub o: Point3,
-    /// The density with which scattering finds the direction, 1/sr.
-    pub pdf: f32,
-    pub specular: bool,
+    /// Sends the paths that go on on their ways. How many do, whose rays are known then, but not what these meet.
+    pub fn leave(&mut self, mut n: usize, scene: &Scene) -> usize {
+        // All at once; few lanes move.
+        let SurfaceLanes { p, p_error, n: normal, ns, .. } = &self.at;
+        for (previous, here) in self.previous.iter_mut().zip([p, p_error, normal, ns]) {
+            previous.copy(n, here);
+        }
+        self.o.copy(n, &self.next_o);
+        self.d.copy(n, &self.next_d);
+        self.bsdf_pdf[..n].copy_from_slice(&self.next_pdf[..n]);
+        if let Some((_, sky)) = scene.lights.sky() {
+            for i in (0..n).filter(|&i| self.goes_on[i] != 0) {
+                self.escape_place[i] = Some(self.place(i, sky));
+            }
+        }
+        // From the last one: what takes the place of a path that ends has gone on.
+        for i in (0..n).rev() {
+            if self.goes_on[i] == 0 {
+                n -= 1;
+                self.shift(i, n);
+            }
+        }
+        for i in 0..n {
+            self.rays[i] = self.ray(i);
+        }
+        n
+    }
 }

@@ -1,13 +1,16 @@
 //! Stages that are computed in lanes.
 
 use super::batch::Batch;
+use crate::path::{Roulette, survival_probability};
 use irradiant_core::bxdf::conductor::mirror_lobe;
-use irradiant_core::bxdf::{Ggx, is_usable};
+use irradiant_core::bxdf::fresnel::fresnel_conductor;
+use irradiant_core::bxdf::is_usable;
 use irradiant_core::geometry::Kernel;
 use irradiant_core::light::{ImageInfiniteLight, places_of_sky};
 use irradiant_math::lanes::{WHOLE, whole};
 use irradiant_math::warp::cosine_hemisphere;
 use irradiant_math::{Point3, Vec3, offset_ray_origin};
+use irradiant_spectrum::SampledSpectrum;
 use std::f32::consts::FRAC_1_PI;
 
 /// Flat surfaces.
@@ -22,16 +25,26 @@ impl Kernel for Surfaces<'_> {
     }
 }
 
-/// The random numbers of a vertex.
-pub(super) struct Numbers<'a>(pub &'a mut Batch, pub usize, pub u32);
+/// The random numbers of a vertex. All of them take half as long again as what most vertices ask for.
+pub(super) struct Numbers<'a> {
+    pub batch: &'a mut Batch,
+    pub n: usize,
+    pub depth: u32,
+    /// Whether there are several lights.
+    pub pick: bool,
+    /// Whether there are models of their own, with lobes.
+    pub lobe: bool,
+    /// Whether paths may end by chance.
+    pub roulette: bool,
+}
 
 impl Kernel for Numbers<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self(b, n, depth) = self;
-        b.streams.light(n, depth, &mut b.light);
-        b.streams.scatter(n, depth, &mut b.scatter);
+        let Self { batch: b, n, depth, pick, lobe, roulette } = self;
+        b.streams.light(n, depth, pick, &mut b.light);
+        b.streams.scatter(n, depth, lobe, roulette, &mut b.scatter);
     }
 }
 
@@ -112,9 +125,10 @@ impl Kernel for Weigh<'_> {
             let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
             let pdf = local_i.z.abs() * FRAC_1_PI;
             let scatters = is_usable(local_o) & is_usable(local_i) & (local_o.z * local_i.z > 0.0);
-            let cosine = wi.dot(frame.z).abs();
-            b.light_factor[i] = b.light_weight(i, pdf);
-            b.light_cosine[i] = if scatters { cosine } else { 0.0 };
+            let cosine = if scatters { wi.dot(frame.z).abs() } else { 0.0 };
+            let (light, counts) = b.bring(i, b.reflectance.at(i) * FRAC_1_PI * cosine, pdf);
+            b.brought.set(i, light);
+            b.brings[i] = u32::from(counts);
         }
         for first in whole(n).step_by(WHOLE) {
             if !b.has_metal(first) {
@@ -124,18 +138,24 @@ impl Kernel for Weigh<'_> {
                 let frame = b.at.frame(i);
                 let wi = b.targets.wi.vector(i);
                 let (local_o, local_i) = (frame.to_local(b.at.wo.vector(i)), frame.to_local(wi));
-                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
-                let (lobe, is_lit) = mirror_lobe(&facets, local_o, local_i);
+                let (lobe, is_lit) = mirror_lobe(&b.facets(i), local_o, local_i);
                 let scatters = is_usable(local_o) & is_usable(local_i) & is_lit & (lobe.pdf.abs() < f32::INFINITY);
-                b.set_lobe(i, &lobe);
-                let is_metal = b.is_metal[i] != 0;
                 let cosine = if scatters { wi.dot(frame.z).abs() } else { 0.0 };
-                let factor = b.light_weight(i, lobe.pdf);
-                b.light_factor[i] = if is_metal { factor } else { b.light_factor[i] };
-                b.light_cosine[i] = if is_metal { cosine } else { b.light_cosine[i] };
+                let f = fresnel_conductor(lobe.cos, b.eta.at(i), b.k.at(i)) * lobe.value;
+                let (light, counts) = b.bring(i, f * cosine, lobe.pdf);
+                let is_metal = b.is_metal[i] != 0;
+                b.brought.set(i, chosen(is_metal, light, b.brought.at(i)));
+                b.brings[i] = if is_metal { u32::from(counts) } else { b.brings[i] };
             }
         }
     }
+}
+
+/// The one or the other, lane by lane.
+#[inline(always)]
+fn chosen(first: bool, a: SampledSpectrum, b: SampledSpectrum) -> SampledSpectrum {
+    let choose = |a: f32, b: f32| if first { a } else { b };
+    SampledSpectrum([choose(a.0[0], b.0[0]), choose(a.0[1], b.0[1]), choose(a.0[2], b.0[2]), choose(a.0[3], b.0[3])])
 }
 
 /// Directions that diffuse surfaces and metals scatter to, and the rays that go there.
@@ -157,7 +177,9 @@ impl Kernel for Scatter<'_> {
             let factor = wi.dot(frame.z).abs() / pdf;
             b.next_d.set(i, wi.to_array());
             b.next_pdf[i] = pdf;
-            b.next_factor[i] = if is_good { factor } else { -1.0 };
+            let f = b.reflectance.at(i) * FRAC_1_PI;
+            b.next_weight.set(i, f * factor);
+            b.goes_on[i] = u32::from(is_good & !f.is_black());
         }
         for first in whole(n).step_by(WHOLE) {
             if !b.has_metal(first) {
@@ -166,7 +188,7 @@ impl Kernel for Scatter<'_> {
             for i in first..first + WHOLE {
                 let frame = b.at.frame(i);
                 let wo = frame.to_local(b.at.wo.vector(i));
-                let facets = Ggx::new(b.alphas[0][i], b.alphas[1][i]);
+                let facets = b.facets(i);
                 let (local, is_above) = facets.bounded_reflection(wo, b.scatter.uv(i));
                 let (lobe, is_lit) = mirror_lobe(&facets, wo, local);
                 let is_good = is_usable(wo)
@@ -175,22 +197,53 @@ impl Kernel for Scatter<'_> {
                     & (lobe.pdf > 0.0)
                     & (lobe.pdf < f32::INFINITY)
                     & is_usable(local);
-                b.set_lobe(i, &lobe);
                 let wi = frame.from_local(local);
                 let factor = wi.dot(frame.z).abs() / lobe.pdf;
-                let factor = if is_good { factor } else { -1.0 };
+                let f = fresnel_conductor(lobe.cos, b.eta.at(i), b.k.at(i)) * lobe.value;
+                let goes_on = u32::from(is_good & !f.is_black() & f.is_finite());
                 let is_metal = b.is_metal[i] != 0;
                 let choose = |a: f32, b: f32| if is_metal { a } else { b };
                 let other = b.next_d.vector(i);
                 b.next_d.set(i, [choose(wi.x, other.x), choose(wi.y, other.y), choose(wi.z, other.z)]);
                 b.next_pdf[i] = choose(lobe.pdf, b.next_pdf[i]);
-                b.next_factor[i] = choose(factor, b.next_factor[i]);
+                b.next_weight.set(i, chosen(is_metal, f * factor, b.next_weight.at(i)));
+                b.goes_on[i] = if is_metal { goes_on } else { b.goes_on[i] };
             }
         }
         for i in whole(n) {
             let wi = b.next_d.vector(i);
             let o: Point3 = offset_ray_origin(b.at.p.point(i), b.at.p_error.vector(i), b.at.n.normal(i), wi);
             b.next_o.set(i, o.to_array());
+        }
+    }
+}
+
+/// What paths carry on in the directions that they were given, and roulette.
+pub(super) struct Survive<'a> {
+    pub batch: &'a mut Batch,
+    pub n: usize,
+    pub roulette: Roulette,
+    /// Scattering events by then.
+    pub depth: u32,
+}
+
+impl Kernel for Survive<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self { batch: b, n, roulette, depth } = self;
+        for i in whole(n) {
+            let throughput = b.throughput.at(i) * b.next_weight.at(i);
+            let scale = b.roulette_scale[i] * b.next_scale[i];
+            let survival = match roulette {
+                Roulette::Throughput => survival_probability(&throughput, scale, depth),
+                Roulette::Constant(q) => 1.0 - q,
+            };
+            let is_tried = survival < 1.0;
+            let ends = throughput.is_black() | (is_tried & (b.scatter.roulette(i) >= survival));
+            b.throughput.set(i, throughput * if is_tried { 1.0 / survival } else { 1.0 });
+            b.roulette_scale[i] = scale;
+            b.goes_on[i] = if ends { 0 } else { b.goes_on[i] };
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::batch::{Batch, MetLamp, Scattering};
 use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::{all_are_sampled, direct_light, samples_by_chance, strata};
 use crate::path::power_heuristic;
@@ -15,11 +15,49 @@ use irradiant_core::light_sampler::{LightSampler, PointLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::Point2;
 use irradiant_math::lanes::LANES;
-use irradiant_spectrum::{SampledSpectrum, Wavelengths};
-use std::f32::consts::FRAC_1_PI;
+use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 
 /// All of [`Compensated`](SampleMode::Compensated): hits are weighed against samples.
 const MODE: SampleMode = SampleMode::Compensated;
+
+/// Whether there is nothing to pick: one light, at all places.
+pub(super) fn has_one_light(scene: &Scene) -> bool {
+    matches!(scene.light_sampler, LightSampler::Uniform(_)) && scene.lights.len() == 1
+}
+
+/// A lamp that shines evenly, of a shape that may have lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlainLamp {
+    /// Of its light, with what its opacity leaves.
+    radiance: SampledSpectrum,
+    two_sided: u32,
+}
+
+impl PlainLamp {
+    fn of(scene: &Scene, id: LightId, lambda: &Wavelengths) -> Option<Self> {
+        match scene.lights.get(id) {
+            Light::Area(lamp) => match (&lamp.shape, &lamp.radiance, lamp.alpha) {
+                (
+                    EmitterShape::Rectangle(_) | EmitterShape::Sphere(_),
+                    AreaRadiance::Uniform(emission),
+                    AreaAlpha::Constant(alpha),
+                ) => {
+                    let radiance = emission.sample(lambda) * lamp.scale * alpha;
+                    Some(Self { radiance, two_sided: u32::from(lamp.two_sided) })
+                }
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// What is known of all lights, where it is the same for all paths: in the RGB basis, and where they are few enough to stay in a cache.
+    pub fn all(scene: &Scene) -> Vec<Option<Self>> {
+        const FEW: usize = 1 << 13;
+        let known = if scene.basis() == Basis::Rgb && scene.lights.len() <= FEW { scene.lights.len() } else { 0 };
+        (0..known as u32).map(|id| Self::of(scene, LightId(id), &Wavelengths::rgb())).collect()
+    }
+}
 
 impl Batch {
     /// A path meets a lamp: what that emits is still to be weighed.
@@ -61,7 +99,7 @@ impl Batch {
                 }
             }
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
-            radiance[self.sample[i] as usize] += self.throughput[i] * met.emitted * weight;
+            radiance[self.sample[i] as usize] += self.throughput.at(i) * met.emitted * weight;
         }
     }
 
@@ -72,7 +110,7 @@ impl Batch {
         depth: u32,
         splits: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
@@ -92,7 +130,7 @@ impl Batch {
         n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> bool {
@@ -109,21 +147,18 @@ impl Batch {
     /// A light of each path whose surface scatters light that it is not known where to look for.
     pub(super) fn pick_lights(&mut self, n: usize, scene: &Scene) {
         self.seek_light(n);
-        match &scene.light_sampler {
-            LightSampler::Uniform(_) if scene.lights.len() == 1 => {
-                for &i in &self.seeking {
-                    (self.picked[i as usize], self.pmf[i as usize]) = (0, 1.0);
-                }
+        if has_one_light(scene) {
+            for &i in &self.seeking {
+                (self.picked[i as usize], self.pmf[i as usize]) = (0, 1.0);
             }
-            sampler => {
-                let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
-                let [_, _, pick, _] = &self.light.0;
-                let (level, tree) = (scene.geometry.level(), &mut self.tree);
-                sampler.sample_lanes(level, &self.seeking, at, pick, tree, &mut self.picked, &mut self.pmf);
-            }
+        } else {
+            let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
+            let [_, _, pick, _] = &self.light.0;
+            let (level, tree) = (scene.geometry.level(), &mut self.tree);
+            scene.light_sampler.sample_lanes(level, &self.seeking, at, pick, tree, &mut self.picked, &mut self.pmf);
         }
-        self.light_times = self.pmf;
-        self.light_share = [1.0; LANES];
+        self.light_times[..n].copy_from_slice(&self.pmf[..n]);
+        self.light_share[..n].fill(1.0);
     }
 
     /// Paths whose surfaces scatter light that it is not known where to look for; no light is picked yet.
@@ -132,7 +167,7 @@ impl Batch {
         for i in 0..n {
             self.pmf[i] = 0.0;
             let scatters = match self.scattering[i] {
-                Scattering::Diffuse => !self.reflectance[i].is_black(),
+                Scattering::Diffuse => !self.reflectance.at(i).is_black(),
                 Scattering::Metal => true,
                 Scattering::Alone(k) => self.bsdfs[k as usize].flags().is_non_specular(),
                 Scattering::Gone => false,
@@ -143,8 +178,45 @@ impl Batch {
         }
     }
 
+    /// Has the shape of a plain lamp in the lanes of its kind. Whether there are lanes for it.
+    #[inline(always)]
+    fn hold(&mut self, i: usize, id: LightId, scene: &Scene) -> bool {
+        if self.rectangle[i] == id.0 {
+            return true;
+        }
+        if self.sphere[i] == id.0 {
+            self.spheres.ask(i);
+            return true;
+        }
+        self.hold_another(i, id, scene)
+    }
+
+    fn hold_another(&mut self, i: usize, id: LightId, scene: &Scene) -> bool {
+        let Light::Area(lamp) = scene.lights.get(id) else { return false };
+        match &lamp.shape {
+            EmitterShape::Rectangle(rectangle) => {
+                self.rectangles.set(i, rectangle);
+                self.rectangle[i] = id.0;
+                true
+            }
+            EmitterShape::Sphere(sphere) => {
+                let is_ball = self.spheres.set(i, sphere);
+                if is_ball {
+                    self.sphere[i] = id.0;
+                    self.spheres.ask(i);
+                }
+                is_ball
+            }
+            EmitterShape::Triangle(_)
+            | EmitterShape::Bilinear(_)
+            | EmitterShape::Disk(_)
+            | EmitterShape::Cylinder(_)
+            | EmitterShape::Curve(_) => false,
+        }
+    }
+
     /// Points of those lamps that have lanes; the others are put down to be asked alone. Whether there are any.
-    fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[CameraSample]) -> bool {
+    fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[BatchSample]) -> bool {
         let sky = scene.lights.sky();
         self.light_alone.clear();
         let (mut any_rectangle, mut any_sphere) = (false, false);
@@ -155,38 +227,18 @@ impl Batch {
                 continue;
             }
             let id = LightId(self.picked[i]);
-            if let Light::Area(lamp) = scene.lights.get(id)
-                && let (AreaRadiance::Uniform(emission), AreaAlpha::Constant(alpha)) = (&lamp.radiance, lamp.alpha)
+            let lamp = match self.known_lamps.get(id.0 as usize) {
+                Some(known) => *known,
+                None => PlainLamp::of(scene, id, &samples[self.sample[i] as usize].lambda),
+            };
+            if let Some(lamp) = lamp
+                && self.hold(i, id, scene)
             {
-                let has_lanes = match &lamp.shape {
-                    EmitterShape::Rectangle(rectangle) => {
-                        if self.rectangle[i] != id.0 {
-                            self.rectangles.set(i, rectangle);
-                            self.rectangle[i] = id.0;
-                        }
-                        any_rectangle = true;
-                        true
-                    }
-                    EmitterShape::Sphere(sphere) => {
-                        let is_ball = self.sphere[i] == id.0 || self.spheres.set(i, sphere);
-                        if is_ball {
-                            self.sphere[i] = id.0;
-                            self.spheres.ask(i);
-                            any_sphere = true;
-                        }
-                        is_ball
-                    }
-                    EmitterShape::Triangle(_)
-                    | EmitterShape::Bilinear(_)
-                    | EmitterShape::Disk(_)
-                    | EmitterShape::Cylinder(_)
-                    | EmitterShape::Curve(_) => false,
-                };
-                if has_lanes {
-                    self.arriving[i] = emission.sample(&samples[self.sample[i] as usize].lambda) * lamp.scale * alpha;
-                    (self.is_delta[i], self.two_sided[i]) = (0, u32::from(lamp.two_sided));
-                    continue;
-                }
+                any_rectangle |= self.rectangle[i] == id.0;
+                any_sphere |= self.sphere[i] == id.0;
+                self.arriving.set(i, lamp.radiance);
+                (self.is_delta[i], self.two_sided[i]) = (0, lamp.two_sided);
+                continue;
             }
             let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(self.light.uv(i), MODE));
             self.light_alone.push((i as u32, line));
@@ -209,7 +261,7 @@ impl Batch {
         n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> bool {
@@ -229,7 +281,8 @@ impl Batch {
             let light = scene.lights.get(LightId(self.picked[i]));
             if let (Some(run), Some((_, sky))) = (run, sky) {
                 if let Some(radiance) = self.sky.arrive(i, sky, run, lambda, MODE) {
-                    (self.arriving[i], self.is_delta[i]) = (radiance, 0);
+                    self.arriving.set(i, radiance);
+                    self.is_delta[i] = 0;
                     any_sky = true;
                 } else {
                     self.pmf[i] = 0.0;
@@ -237,7 +290,7 @@ impl Batch {
                 continue;
             }
             let sample = if may_pass && light.is_delta() {
-                radiance[s] += self.light_through_mixes(i, depth, scene, lambda, stats);
+                radiance[s] += self.light_through_mixes(i, depth, scene, &samples[s], stats);
                 None
             } else {
                 light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE)
@@ -246,7 +299,7 @@ impl Batch {
                 self.pmf[i] = 0.0;
                 continue;
             };
-            self.arriving[i] = sample.radiance * scene.opacity(&sample);
+            self.arriving.set(i, sample.radiance * scene.opacity(&sample));
             self.targets.set(i, &sample);
             self.is_delta[i] = u32::from(sample.is_delta);
             any = true;
@@ -264,16 +317,16 @@ impl Batch {
         i: usize,
         depth: u32,
         scene: &Scene,
-        lambda: &Wavelengths,
+        sample: &BatchSample,
         stats: &mut RenderStats,
     ) -> SampledSpectrum {
         direct_light(
             scene,
             &self.interaction(i),
             &self.bsdf(i),
-            &self.throughput[i],
-            lambda,
-            &self.light.light_draws(i),
+            &self.throughput.at(i),
+            &sample.lambda,
+            &sample.stream(scene).light(depth),
             None,
             1,
             None,
@@ -299,25 +352,22 @@ impl Batch {
             if self.pmf[i] == 0.0 || self.targets.pdf[i] == 0.0 {
                 continue;
             }
-            let (f, factor) = match self.scattering[i] {
-                Scattering::Diffuse => (self.reflectance[i] * FRAC_1_PI, self.light_factor[i]),
-                Scattering::Metal => (self.metal_f(i), self.light_factor[i]),
+            let (light, counts) = match self.scattering[i] {
+                Scattering::Diffuse | Scattering::Metal => (self.brought.at(i), self.brings[i] != 0),
                 Scattering::Alone(k) => {
                     let (bsdf, wi) = (&self.bsdfs[k as usize], self.targets.wi.vector(i));
                     let (f, pdf) = bsdf.f_and_pdf(self.at.wo.vector(i), wi, TransportMode::Radiance);
-                    self.light_cosine[i] = wi.dot(bsdf.frame.z).abs();
-                    (f, self.light_weight(i, pdf))
+                    self.bring(i, f * wi.dot(bsdf.frame.z).abs(), pdf)
                 }
                 Scattering::Gone => continue,
             };
-            let f = f * self.light_cosine[i];
-            if f.is_black() || self.arriving[i].is_black() || !f.is_finite() {
+            if !counts {
                 continue;
             }
             let (ray, end) = self.targets.ray(i, self.time[i]);
             self.shadow_rays.push(ray);
             self.shadow_ends.push(end);
-            self.shadow_light.push((self.sample[i], self.throughput[i] * f * self.arriving[i] * factor));
+            self.shadow_light.push((self.sample[i], light));
         }
         stats.shadow_rays += self.shadow_rays.len() as u64;
         let mut occluded = [false; LANES];

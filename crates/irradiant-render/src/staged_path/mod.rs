@@ -20,21 +20,19 @@ mod split;
 
 pub(crate) use batch::{Batch, Plain};
 
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
-use crate::path::{PathIntegrator, Roulette, Walk, survival_probability};
+use crate::path::{PathIntegrator, Walk};
 use crate::record::NoRecord;
 use batch::{Scattering, Surface, nowhere};
 use irradiant_core::bxdf::Bxdf;
-use irradiant_core::camera::CameraRay;
-use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::Interaction;
-use irradiant_core::sampler::{SampleStream, StreamLanes};
+use irradiant_core::sampler::StreamLanes;
 use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
 use irradiant_math::lanes::LANES;
-use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
-use kernels::{Numbers, Surfaces};
+use irradiant_spectrum::{Basis, SampledSpectrum};
+use kernels::{Surfaces, Survive};
 
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
@@ -50,12 +48,12 @@ impl PathIntegrator {
         &self,
         b: &mut Batch,
         scene: &Scene,
-        samples: &mut [CameraSample],
-        hits: &[Option<Hit>],
+        samples: &mut [BatchSample],
+        begin: Beginnings,
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        let n = b.begin(scene, samples, hits);
+        let n = b.begin(scene, samples, &begin);
         self.walk_on(b, n, 0, scene, samples, radiance, stats);
     }
 
@@ -67,7 +65,7 @@ impl PathIntegrator {
         mut n: usize,
         mut depth: u32,
         scene: &Scene,
-        samples: &mut [CameraSample],
+        samples: &mut [BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
@@ -76,7 +74,7 @@ impl PathIntegrator {
             if n == 0 || self.is_at_limit(depth) {
                 return;
             }
-            scene.geometry.level().run(Numbers(b, n, depth));
+            b.draw(n, depth, scene, self.plays_roulette(depth + 1));
             b.light_samples(n, depth, self.light_splits_at(depth), scene, samples, radiance, stats);
             b.scatter(n, scene);
             depth += 1;
@@ -92,7 +90,7 @@ impl PathIntegrator {
         n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &mut [CameraSample],
+        samples: &mut [BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> usize {
@@ -109,26 +107,31 @@ impl PathIntegrator {
     fn arrive(
         &self,
         b: &mut Batch,
-        n: usize,
+        mut n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
     ) -> (usize, usize) {
-        let (mut stay, mut n_flat) = (0, 0);
-        for i in 0..n {
-            let s = b.sample[i] as usize;
+        let sees_light = !scene.lights.environments().is_empty();
+        let (mut i, mut n_flat) = (0, 0);
+        while i < n {
             let Some(hit) = &b.met[i] else {
-                radiance[s] += self.escaped(scene, &b.walk(i, depth), &samples[s].lambda, &mut NoRecord);
+                if sees_light {
+                    let s = b.sample[i] as usize;
+                    radiance[s] += self.escaped(scene, &b.walk(i, depth), &samples[s].lambda, &mut NoRecord);
+                }
+                // The last one takes its place.
+                n -= 1;
+                b.shift(i, n);
                 continue;
             };
-            let flat = scene.geometry.flat_triangle(hit, &mut b.triangles, stay);
+            let flat = scene.geometry.flat_triangle(hit, &mut b.triangles, i);
             n_flat += usize::from(flat.is_some());
-            b.surface[stay] = flat.map_or(Surface::Other, |(material, light)| Surface::Flat(material, light));
-            b.shift(stay, i);
-            stay += 1;
+            b.surface[i] = flat.map_or(Surface::Other, |(material, light)| Surface::Flat(material, light));
+            i += 1;
         }
-        (stay, n_flat)
+        (n, n_flat)
     }
 
     /// How light scatters where paths are, and what is emitted there.
@@ -138,7 +141,7 @@ impl PathIntegrator {
         n: usize,
         depth: u32,
         scene: &Scene,
-        samples: &mut [CameraSample],
+        samples: &mut [BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
@@ -185,11 +188,11 @@ impl PathIntegrator {
         i: usize,
         depth: u32,
         scene: &Scene,
-        sample: &mut CameraSample,
+        sample: &mut BatchSample,
         radiance: &mut SampledSpectrum,
         stats: &mut RenderStats,
     ) {
-        let (Some(hit), Some(camera_ray)) = (&b.met[i], &sample.camera_ray) else { return };
+        let Some(hit) = &b.met[i] else { return };
         let ray = b.ray(i);
         let mut at = Interaction::unknown(&ray, hit.t);
         scene.geometry.fill_in(&ray, hit, &mut at);
@@ -204,14 +207,17 @@ impl PathIntegrator {
                 Frame::from_z_near_x(at.ns.as_vec(), at.dpdus)
             }
             Plain::Other => {
-                let footprint = scene.texture_context(&at, (depth == 0).then_some(camera_ray));
-                let (mix, mut after) = (sample.stream.mix(depth), lambda);
+                let sees_texture = depth == 0 && scene.materials.is_textured(at.material);
+                let camera_ray = if sees_texture { sample.camera_ray(scene) } else { None };
+                let footprint = scene.texture_context(&at, camera_ray.as_ref());
+                let stream = sample.stream(scene);
+                let (mix, mut after) = (stream.mix(depth), lambda);
                 let bsdf = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, &mut after, mix);
                 let Some(bsdf) = bsdf else {
                     // An interface: the path would come to its next vertex one step after the others.
                     b.scattering[i] = Scattering::Gone;
                     let mut walk = b.walk(i, depth);
-                    self.go_alone(&mut walk, radiance, scene, camera_ray, &sample.stream, &mut sample.lambda, stats);
+                    self.go_alone(&mut walk, radiance, scene, sample, stats);
                     return;
                 };
                 sample.lambda = after;
@@ -235,46 +241,27 @@ impl PathIntegrator {
         walk: &mut Walk,
         radiance: &mut SampledSpectrum,
         scene: &Scene,
-        camera_ray: &CameraRay,
-        stream: &SampleStream,
-        lambda: &mut Wavelengths,
+        sample: &mut BatchSample,
         stats: &mut RenderStats,
     ) {
-        self.follow(walk, radiance, None, scene, camera_ray, stream, lambda, &mut [], stats, &mut NoRecord);
+        let (Some(ray), stream) = (sample.camera_ray(scene), sample.stream(scene)) else { return };
+        self.follow(walk, radiance, None, scene, &ray, &stream, &mut sample.lambda, &mut [], stats, &mut NoRecord);
     }
 
     /// Plays roulette and traces the rays of paths that go on, `depth` scattering events by then. How many do.
     fn go_on(&self, b: &mut Batch, n: usize, depth: u32, scene: &Scene, stats: &mut RenderStats) -> usize {
-        let mut stay = 0;
-        for i in 0..n {
-            let Some(turn) = b.turn(i) else { continue };
-            let mut throughput = b.throughput[i] * turn.weight;
-            let roulette_scale = b.roulette_scale[i] * turn.scale;
-            stats.scatterings += 1;
-            stats.longest_path = stats.longest_path.max(depth);
-            if throughput.is_black() {
-                continue;
-            }
-            let survival = match self.roulette {
-                Roulette::Throughput => survival_probability(&throughput, roulette_scale, depth),
-                Roulette::Constant(q) => 1.0 - q,
-            };
-            if survival < 1.0 {
-                if b.scatter.roulette(i) >= survival {
-                    continue;
-                }
-                throughput *= 1.0 / survival;
-            }
-            stats.bounce_rays += 1;
-            b.leave(stay, i, &turn, throughput, roulette_scale, scene);
-            stay += 1;
-        }
+        let directions = b.count_going(n);
+        scene.geometry.level().run(Survive { batch: b, n, roulette: self.roulette, depth });
+        stats.scatterings += directions;
+        stats.longest_path = stats.longest_path.max(if directions > 0 { depth } else { 0 });
+        let n = b.leave(n, scene);
+        stats.bounce_rays += n as u64;
         b.light_splits = self.light_splits_at(depth - 1);
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
-            return those_that_escape(b, stay, scene);
+            return those_that_escape(b, n, scene);
         }
-        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
-        stay
+        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        n
     }
 }
 

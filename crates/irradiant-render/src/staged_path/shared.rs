@@ -2,15 +2,13 @@
 //! and after them its paths go by the common stages.
 
 use super::batch::{Batch, Scattering, Surface};
-use super::kernels::Numbers;
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, survival_probability};
 use crate::shared_path::blocks::{Blocks, FirstScattering, Kind, Leaving};
 use crate::shared_path::sky::{Glimpse, SharedSky};
 use crate::shared_path::{Incoming, LEAST_ALPHA, LEAST_IMPORTANCE, Lamps, PIXELS, Second, gains, is_shared};
 use irradiant_core::bxdf::Bxdf;
-use irradiant_core::geometry::Hit;
 use irradiant_core::interaction::LightId;
 use irradiant_core::light::SkyPoint;
 use irradiant_core::scene::Scene;
@@ -32,7 +30,7 @@ impl Batch {
     fn gains(&self, i: usize) -> bool {
         match self.scattering[i] {
             Scattering::Diffuse => true,
-            Scattering::Metal => !(self.metals[i].alpha() < LEAST_ALPHA),
+            Scattering::Metal => !(self.metal(i).alpha() < LEAST_ALPHA),
             Scattering::Alone(k) => gains(&self.bsdfs[k as usize]),
             Scattering::Gone => false,
         }
@@ -51,6 +49,25 @@ impl Batch {
                 self.sky_samples.push((i as u32, point, self.light_share[i], pmf));
             }
         }
+    }
+
+    /// Leaves in `blocks` where paths look from first vertices that share the sky, and ends those that see it. How many go on.
+    fn look_at_sky(&mut self, mut n: usize, sky: &SharedSky, blocks: &mut Blocks) -> usize {
+        for i in (0..n).rev() {
+            let s = self.sample[i] as usize;
+            if blocks.kinds[s] != Kind::First {
+                continue;
+            }
+            let point = sky.sky.look(self.d.vector(i), self.escape_place[i]);
+            let sees = self.met[i].is_none();
+            blocks.set_glimpse(s, false, Glimpse { point, factor: 1.0, sees });
+            if sees {
+                // The last one takes its place, which has been asked.
+                n -= 1;
+                self.shift(i, n);
+            }
+        }
+        n
     }
 
     /// Leaves in `blocks` the light samples of the sky that first vertices have drawn, and what else is needed to share it.
@@ -84,21 +101,20 @@ impl PathIntegrator {
         b: &mut Batch,
         scene: &Scene,
         sky: Option<&SharedSky>,
-        samples: &mut [CameraSample],
-        hits: &[Option<Hit>],
+        samples: &mut [BatchSample],
+        begin: Beginnings,
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
-        let level = scene.geometry.level();
         blocks.begin(samples.len());
 
         // First vertices.
-        let n = b.begin(scene, samples, hits);
+        let n = b.begin(scene, samples, &begin);
         let n = self.meet(b, n, 0, scene, samples, &mut blocks.own, stats);
         if self.is_at_limit(0) || n == 0 {
             return;
         }
-        level.run(Numbers(b, n, 0));
+        b.draw(n, 0, scene, sky.is_some());
         b.shared_sky = sky.map(|sky| sky.id);
         b.light_samples(n, 0, self.light_splits_at(0), scene, samples, &mut blocks.own, stats);
         if let Some(sky) = sky {
@@ -112,9 +128,10 @@ impl PathIntegrator {
                     Surface::Flat(material, _) => Some(material),
                     Surface::Other => None,
                 };
+                let metal = b.metal(i);
                 let scattering = match b.scattering[i] {
-                    Scattering::Diffuse | Scattering::Gone => FirstScattering::Diffuse(b.reflectance[i]),
-                    Scattering::Metal => FirstScattering::Metal(&b.metals[i]),
+                    Scattering::Diffuse | Scattering::Gone => FirstScattering::Diffuse(b.reflectance.at(i)),
+                    Scattering::Metal => FirstScattering::Metal(&metal),
                     Scattering::Alone(k) => FirstScattering::Alone(&b.bsdfs[k as usize]),
                 };
                 blocks.set_first(s, &b.at, i, b.time[i], scattering, material);
@@ -138,7 +155,7 @@ impl PathIntegrator {
         }
         if !self.is_at_limit(1) && n > 0 {
             self.share_second(b, n, blocks);
-            level.run(Numbers(b, n, 1));
+            b.draw(n, 1, scene, true);
             self.light_at_second(b, n, scene, samples, blocks, stats);
             b.scatter(n, scene);
             for (s, kind) in blocks.kinds.iter().enumerate() {
@@ -162,39 +179,24 @@ impl PathIntegrator {
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
-        let mut stay = 0;
-        for i in 0..n {
-            let Some(turn) = b.turn(i) else { continue };
+        b.carry(n, |b, i, throughput, scale| {
             let s = b.sample[i] as usize;
-            let (throughput, scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(1);
             // What is of no use to its own pixel is of use to others. Roulette ends no path here.
             if throughput.is_black() && blocks.kinds[s] == Kind::Apart {
-                continue;
+                return None;
             }
             stats.bounce_rays += 1;
-            b.leave(stay, i, &turn, throughput, scale, scene);
-            stay += 1;
-        }
+            Some((throughput, scale))
+        });
+        let n = b.leave(n, scene);
         b.light_splits = self.light_splits_at(0);
-        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
-        let Some(sky) = sky else { return stay };
-        let all = std::mem::replace(&mut stay, 0);
-        for i in 0..all {
-            let s = b.sample[i] as usize;
-            if blocks.kinds[s] == Kind::First {
-                let point = sky.sky.look(b.d.vector(i), b.escape_place[i]);
-                let sees = b.met[i].is_none();
-                blocks.set_glimpse(s, false, Glimpse { point, factor: 1.0, sees });
-                if sees {
-                    continue;
-                }
-            }
-            b.shift(stay, i);
-            stay += 1;
+        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        match sky {
+            Some(sky) => b.look_at_sky(n, sky, blocks),
+            None => n,
         }
-        stay
     }
 
     /// Notes second vertices that can be shared, and from there counts light as it leaves them.
@@ -204,7 +206,7 @@ impl PathIntegrator {
             if blocks.kinds[s] != Kind::First || b.scattering[i] == Scattering::Gone {
                 continue;
             }
-            let carried = b.throughput[i];
+            let carried = b.throughput.at(i);
             if !b.is_shared(i) {
                 blocks.kinds[s] = Kind::Own;
                 if carried.is_black() {
@@ -213,7 +215,7 @@ impl PathIntegrator {
                 continue;
             }
             b.roulette_scale[i] = carried.max_component().max(LEAST_IMPORTANCE);
-            b.throughput[i] = SampledSpectrum::ONE;
+            b.throughput.set(i, SampledSpectrum::ONE);
             let wo = b.at.wo.vector(i);
             let light = if b.is_even(i) {
                 blocks.kinds[s] = Kind::Evenly;
@@ -237,7 +239,7 @@ impl PathIntegrator {
         b: &mut Batch,
         n: usize,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) {
@@ -254,7 +256,7 @@ impl PathIntegrator {
                 continue;
             }
             let pmf = std::mem::take(&mut b.pmf[i]);
-            if pmf == 0.0 || b.targets.pdf[i] == 0.0 || b.arriving[i].is_black() {
+            if pmf == 0.0 || b.targets.pdf[i] == 0.0 || b.arriving.at(i).is_black() {
                 continue;
             }
             let (ray, end) = b.targets.ray(i, b.time[i]);
@@ -262,7 +264,7 @@ impl PathIntegrator {
             b.shadow_ends.push(end);
             let incoming = Incoming {
                 wi: b.targets.wi.vector(i),
-                radiance: b.arriving[i],
+                radiance: b.arriving.at(i),
                 light_pdf: pmf * b.targets.pdf[i],
                 found_by_bsdf: b.is_delta[i] == 0,
             };
@@ -290,15 +292,12 @@ impl PathIntegrator {
         b: &mut Batch,
         n: usize,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         blocks: &mut Blocks,
         stats: &mut RenderStats,
     ) -> usize {
-        let mut stay = 0;
-        for i in 0..n {
-            let Some(turn) = b.turn(i) else { continue };
+        b.carry(n, |b, i, mut throughput, mut scale| {
             let s = b.sample[i] as usize;
-            let (mut throughput, mut scale) = (b.throughput[i] * turn.weight, b.roulette_scale[i] * turn.scale);
             stats.scatterings += 1;
             stats.longest_path = stats.longest_path.max(2);
             if blocks.kinds[s] == Kind::By {
@@ -306,29 +305,29 @@ impl PathIntegrator {
                 scale *= throughput.max_component().max(LEAST_IMPORTANCE);
                 let survival = survival_probability(&SampledSpectrum::splat(scale), 1.0, 2);
                 if b.scatter.roulette(i) >= survival {
-                    continue;
+                    return None;
                 }
                 throughput = SampledSpectrum::splat(1.0 / survival);
-                blocks.next[s] = Some(turn.wi);
+                blocks.next[s] = Some(b.next_d.vector(i));
             } else {
                 if throughput.is_black() {
-                    continue;
+                    return None;
                 }
                 let survival = survival_probability(&throughput, scale, 2);
                 if survival < 1.0 {
                     if b.scatter.roulette(i) >= survival {
-                        continue;
+                        return None;
                     }
                     throughput *= 1.0 / survival;
                 }
             }
             stats.bounce_rays += 1;
-            b.leave(stay, i, &turn, throughput, scale, scene);
-            stay += 1;
-        }
+            Some((throughput, scale))
+        });
+        let n = b.leave(n, scene);
         b.light_splits = 1;
-        scene.geometry.intersect_scattered(&b.rays[..stay], &scene.alpha(), &mut b.met[..stay]);
-        for i in 0..stay {
+        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        for i in 0..n {
             let s = b.sample[i] as usize;
             if blocks.kinds[s] == Kind::By {
                 // As in `SharedPathIntegrator::incoming`: first with any density of the direction, then with none.
@@ -337,11 +336,11 @@ impl PathIntegrator {
                 b.bsdf_pdf[i] = 0.0;
             }
         }
-        stay
+        n
     }
 
     /// What the ray of a lane sees of lamps that light samples find too.
-    fn lamps_seen(&self, b: &mut Batch, i: usize, scene: &Scene, sample: &CameraSample, wi: Vec3, blocks: &mut Blocks) {
+    fn lamps_seen(&self, b: &mut Batch, i: usize, scene: &Scene, sample: &BatchSample, wi: Vec3, blocks: &mut Blocks) {
         let s = b.sample[i];
         let mut lamps = Lamps(wi, |light| blocks.incoming.push((s, light)));
         let Some(hit) = b.met[i] else {

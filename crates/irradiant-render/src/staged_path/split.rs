@@ -1,7 +1,7 @@
 //! Several light samples at a vertex, as [`split_light`](crate::light_samples) takes them: the first of all paths, then the second of all.
 
 use super::batch::Batch;
-use crate::camera_samples::CameraSample;
+use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::{all_are_sampled, samples_by_chance};
 use irradiant_core::interaction::LightId;
@@ -18,7 +18,7 @@ impl Batch {
         depth: u32,
         splits: u32,
         scene: &Scene,
-        samples: &[CameraSample],
+        samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
@@ -74,7 +74,7 @@ impl Batch {
         let level = scene.geometry.level();
         for stratum in 0..splits {
             for i in 0..n {
-                self.light_pick[i] = self.light.light_draws(i).pick_in_stratum(stratum, splits);
+                self.light_pick[i] = self.light.pick_in_stratum(i, stratum, splits);
             }
             let at = PointLanes { p: &self.at.p, p_error: &self.at.p_error, n: &self.at.n, ns: &self.at.ns };
             let (picked, pmf) = (&mut self.picked, &mut self.pmf);
