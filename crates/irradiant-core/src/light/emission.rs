@@ -91,7 +91,7 @@ enum Pixels {
 const HALF_SCALE: f32 = 5.192_296_9e33;
 
 /// The value of a finite, non-negative half; subnormal ones too, since the product is exact.
-#[inline]
+#[inline(always)]
 fn from_half(half: u16) -> f32 {
     f32::from_bits(u32::from(half) << 13) * HALF_SCALE
 }
@@ -124,7 +124,7 @@ impl Pixels {
         Self::Half(all.into_boxed_slice())
     }
 
-    #[inline]
+    #[inline(always)]
     fn at(&self, i: usize) -> [f32; 3] {
         match self {
             Self::Half(pixels) => pixels[i].map(from_half),
@@ -201,7 +201,7 @@ impl RadianceImage {
     }
 
     /// The mean of the channels of each of `means.len()` pixels of row `y` from column `x` on.
-    #[inline]
+    #[inline(always)]
     pub(super) fn means(&self, x: usize, y: usize, means: &mut [f32]) {
         let first = y * self.width + x;
         let row = first..first + means.len();
@@ -221,7 +221,7 @@ impl RadianceImage {
     }
 
     /// The pixel in column `x` of row `y` from the top, both within the image.
-    #[inline]
+    #[inline(always)]
     pub fn pixel(&self, x: usize, y: usize) -> [f32; 3] {
         self.pixels.at(y * self.width + x)
     }
@@ -268,7 +268,7 @@ impl RadianceImage {
     }
 
     /// Asks for the memory of `count` pixels of row `y` from column `x` on, at most three cache lines.
-    #[inline]
+    #[inline(always)]
     pub(super) fn prefetch_run(&self, x: usize, y: usize, count: usize) {
         let end = self.width * self.height - 1;
         let (first, middle, last) =

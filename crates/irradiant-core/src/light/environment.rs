@@ -163,7 +163,7 @@ impl ImageInfiniteLight {
         &self.scene
     }
 
-    #[inline]
+    #[inline(always)]
     fn density(&self, mode: SampleMode) -> &PixelDensity {
         let cell = match mode {
             SampleMode::Complete => &self.complete,
@@ -176,7 +176,7 @@ impl ImageInfiniteLight {
 
     /// Radiance where the image has this colour.
     #[inline]
-    fn radiance(&self, rgb: [f32; 3], lambda: &Wavelengths) -> SampledSpectrum {
+    pub(super) fn radiance(&self, rgb: [f32; 3], lambda: &Wavelengths) -> SampledSpectrum {
         self.image.radiance(rgb, lambda) * self.scale
     }
 
@@ -188,7 +188,7 @@ impl ImageInfiniteLight {
 
     /// The first of three steps to what [`ImageInfiniteLight::sample`] gives for `u`. Each asks for the memory that the next one
     /// reads: take each for many samples before the next, and no one waits.
-    #[inline]
+    #[inline(always)]
     pub fn seek(&self, u: Point2, mode: SampleMode) -> PixelLine {
         let line = self.density(mode).seek(u);
         self.density(mode).prefetch_line(&line);
@@ -196,7 +196,7 @@ impl ImageInfiniteLight {
     }
 
     /// The second step.
-    #[inline]
+    #[inline(always)]
     pub fn approach(&self, line: PixelLine, mode: SampleMode) -> PixelRun {
         let run = self.density(mode).approach(line);
         self.density(mode).prefetch_run(&self.image, &run);
@@ -209,16 +209,10 @@ impl ImageInfiniteLight {
         Some(self.light_from(self.density(mode).arrive(&self.image, run)?, lambda))
     }
 
-    /// The last, but for what [`ImageInfiniteLight::direction`] says of it.
-    #[inline]
-    pub(super) fn arrive_at(
-        &self,
-        run: PixelRun,
-        lambda: &Wavelengths,
-        mode: SampleMode,
-    ) -> Option<(PixelSample, SampledSpectrum)> {
-        let sample = self.density(mode).arrive(&self.image, run)?;
-        Some((sample, self.radiance(sample.rgb, lambda)))
+    /// The last, but for what [`ImageInfiniteLight::direction`] and [`ImageInfiniteLight::radiance`] say of it.
+    #[inline(always)]
+    pub(super) fn arrive_at(&self, run: PixelRun, mode: SampleMode) -> Option<PixelSample> {
+        self.density(mode).arrive(&self.image, run)
     }
 
     /// The direction to a point of the image, and the density with which it is drawn where that of the point is `pdf`.

@@ -72,7 +72,7 @@ pub struct PixelRun {
     u: f32,
 }
 
-#[inline]
+#[inline(always)]
 fn brightness(rgb: [f32; 3]) -> f32 {
     (rgb[0] + rgb[1] + rgb[2]) * (1.0 / 3.0)
 }
@@ -141,12 +141,12 @@ impl PixelDensity {
         Some(density)
     }
 
-    #[inline]
+    #[inline(always)]
     fn weight(&self, rgb: [f32; 3]) -> f32 {
         self.weight_of_mean(brightness(rgb))
     }
 
-    #[inline]
+    #[inline(always)]
     fn weight_of_mean(&self, mean: f32) -> f32 {
         (mean - self.threshold).max(0.0) + self.base
     }
@@ -164,7 +164,7 @@ impl PixelDensity {
     }
 
     /// The first of the three steps of [`PixelDensity::sample`].
-    #[inline]
+    #[inline(always)]
     pub fn seek(&self, u: Point2) -> PixelLine {
         let (y, dy) = self.rows.sample_cell(u.y);
         // Counting entries is branchless, and several are compared at once.
@@ -175,13 +175,13 @@ impl PixelDensity {
     }
 
     /// Asks for the memory that [`PixelDensity::approach`] reads.
-    #[inline]
+    #[inline(always)]
     pub fn prefetch_line(&self, at: &PixelLine) {
         irradiant_bvh::prefetch_read(&self.fine[at.y * self.lines_per_row + at.line]);
     }
 
     /// The second step.
-    #[inline]
+    #[inline(always)]
     pub fn approach(&self, PixelLine { u, y, dy, line }: PixelLine) -> PixelRun {
         let first = y * self.lines_per_row;
         let coarse = &self.coarse[first..first + self.lines_per_row];
@@ -194,13 +194,13 @@ impl PixelDensity {
     }
 
     /// Asks for the memory that [`PixelDensity::arrive`] reads.
-    #[inline]
+    #[inline(always)]
     pub fn prefetch_run(&self, image: &RadianceImage, at: &PixelRun) {
         image.prefetch_run(at.first, at.y, RUN);
     }
 
     /// The last step.
-    #[inline]
+    #[inline(always)]
     pub fn arrive(&self, image: &RadianceImage, at: PixelRun) -> Option<PixelSample> {
         let PixelRun { y, dy, first, u: u_run } = at;
         let pixels = image.width().saturating_sub(first).min(RUN);

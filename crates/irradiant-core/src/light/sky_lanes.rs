@@ -1,14 +1,18 @@
 //! An image of the sky in many directions, side by side.
 
-use super::{ImageInfiniteLight, PixelRun, SampleMode, TargetLanes};
+use super::{ImageInfiniteLight, PixelLine, PixelRun, SampleMode, TargetLanes};
 use irradiant_math::Point2;
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
 use irradiant_spectrum::{SampledSpectrum, Wavelengths};
 
-/// Points of the image that were drawn for some lanes.
+/// Points of the image that are drawn for some lanes.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct SkyLanes {
+    wanted: Vec<u32>,
+    lines: Vec<PixelLine>,
+    runs: Vec<PixelRun>,
+    // Points that were drawn.
     u: Floats,
     v: Floats,
     /// Densities over the image.
@@ -25,6 +29,9 @@ pub struct SkyLanes {
 impl SkyLanes {
     /// Nothing yet.
     pub const NONE: Self = Self {
+        wanted: Vec::new(),
+        lines: Vec::new(),
+        runs: Vec::new(),
         u: [0.0; LANES],
         v: [0.0; LANES],
         pdf: [0.0; LANES],
@@ -34,26 +41,49 @@ impl SkyLanes {
         per_angle: [0.0; LANES],
     };
 
-    /// Nothing is drawn for a lane, unless it is later.
-    #[inline(always)]
-    pub fn forget(&mut self, i: usize) {
-        self.is_drawn[i] = 0;
+    /// No lane wants a point yet.
+    #[inline]
+    pub fn begin(&mut self) {
+        self.wanted.clear();
+        self.is_drawn = [0; LANES];
     }
 
-    /// [`ImageInfiniteLight::arrive`] for a lane, but for the direction: the radiance, or `None`.
-    #[inline]
-    pub fn arrive(
-        &mut self,
-        i: usize,
-        sky: &ImageInfiniteLight,
-        run: PixelRun,
-        lambda: &Wavelengths,
-        mode: SampleMode,
-    ) -> Option<SampledSpectrum> {
-        let (sample, radiance) = sky.arrive_at(run, lambda, mode)?;
-        (self.u[i], self.v[i], self.pdf[i], self.is_drawn[i]) = (sample.uv.x, sample.uv.y, sample.pdf, 1);
-        self.rgb[i] = sample.rgb;
-        Some(radiance)
+    /// A lane wants a point.
+    #[inline(always)]
+    pub fn ask(&mut self, i: usize) {
+        self.wanted.push(i as u32);
+    }
+
+    /// The lanes that want a point.
+    pub fn wanted(&self) -> &[u32] {
+        &self.wanted
+    }
+
+    /// Draws a point for each lane that wants one, by its numbers `u`. Each step of [`ImageInfiniteLight::sample`] for all lanes before the next:
+    /// the way to a point of the sky is waiting for memory.
+    #[inline(always)]
+    pub fn draw(&mut self, sky: &ImageInfiniteLight, [u, v]: [&Floats; 2], mode: SampleMode) {
+        self.lines.clear();
+        for &i in &self.wanted {
+            self.lines.push(sky.seek(Point2::new(u[i as usize], v[i as usize]), mode));
+        }
+        self.runs.clear();
+        for &line in &self.lines {
+            self.runs.push(sky.approach(line, mode));
+        }
+        for (&i, &run) in self.wanted.iter().zip(&self.runs) {
+            let i = i as usize;
+            if let Some(sample) = sky.arrive_at(run, mode) {
+                (self.u[i], self.v[i], self.pdf[i], self.is_drawn[i]) = (sample.uv.x, sample.uv.y, sample.pdf, 1);
+                self.rgb[i] = sample.rgb;
+            }
+        }
+    }
+
+    /// Radiance at the point drawn for a lane, `None` if none is.
+    #[inline(always)]
+    pub fn radiance(&self, i: usize, sky: &ImageInfiniteLight, lambda: &Wavelengths) -> Option<SampledSpectrum> {
+        self.rgb(i).map(|rgb| sky.radiance(rgb, lambda))
     }
 
     /// The colour of the image at the point drawn for a lane, `None` if none is.
@@ -102,6 +132,7 @@ mod tests {
     struct Look<'a> {
         sky: &'a ImageInfiniteLight,
         lanes: &'a mut SkyLanes,
+        numbers: &'a [Floats; 2],
         directions: &'a Triples,
         places: &'a mut [Floats; 2],
         out: &'a mut TargetLanes,
@@ -111,6 +142,8 @@ mod tests {
         type Output = ();
         #[inline(always)]
         fn run(self) {
+            let [u, v] = self.numbers;
+            self.lanes.draw(self.sky, [u, v], SampleMode::Compensated);
             self.lanes.directions(233, self.sky, self.out);
             places_of_sky(self.sky, 233, self.directions, self.places);
         }
@@ -130,14 +163,14 @@ mod tests {
             let sky = ImageInfiniteLight::new(image.clone(), Orientation::new(&turned), 2.0, scene).expect("a square");
             for level in Level::available() {
                 let (mut lanes, mut out, mut places) = (SkyLanes::NONE, TargetLanes::NONE, [[0.0; LANES]; 2]);
-                let mut directions = Triples::ZERO;
+                let (mut directions, mut numbers) = (Triples::ZERO, [[0.0; LANES]; 2]);
                 let mut alone = Vec::new();
                 for i in 0..LANES {
                     let u = Point2::new(rng.next_f32(), rng.next_f32());
                     let sample = sky.sample(u, &lambda, mode).expect("not black");
+                    (numbers[0][i], numbers[1][i]) = (u.x, u.y);
                     if i % 5 != 0 {
-                        let run = sky.approach(sky.seek(u, mode), mode);
-                        assert_eq!(lanes.arrive(i, &sky, run, &lambda, mode), Some(sample.radiance));
+                        lanes.ask(i);
                     }
                     out.pdf[i] = -1.0;
                     alone.push(sample);
@@ -145,12 +178,20 @@ mod tests {
                     directions.set(i, d);
                 }
                 let lanes = &mut lanes;
-                level.run(Look { sky: &sky, lanes, directions: &directions, places: &mut places, out: &mut out });
+                level.run(Look {
+                    sky: &sky,
+                    lanes: &mut *lanes,
+                    numbers: &numbers,
+                    directions: &directions,
+                    places: &mut places,
+                    out: &mut out,
+                });
                 for (i, sample) in alone.iter().enumerate().take(233) {
                     if i % 5 == 0 {
                         assert_eq!(out.pdf[i], -1.0, "not asked");
                     } else {
                         assert_eq!((out.wi.vector(i), out.pdf[i]), (sample.wi, sample.pdf), "{level:?} {i}");
+                        assert_eq!(lanes.radiance(i, &sky, &lambda), Some(sample.radiance));
                     }
                     let place = sky.place(directions.vector(i));
                     assert_eq!(Point2::new(places[0][i], places[1][i]), place, "{level:?} {i}");

@@ -9,7 +9,7 @@ use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
 use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
-use irradiant_core::light::{ImageInfiniteLight, PixelLine, PixelRun, SkyLanes, SkyPoint, TargetLanes};
+use irradiant_core::light::{ImageInfiniteLight, SkyLanes, SkyPoint, TargetLanes};
 use irradiant_core::light_sampler::{PickedLight, TreeLanes};
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
@@ -177,9 +177,8 @@ pub(crate) struct Batch {
     /// What the light brings to the sample, but for what is in the way, and whether it is to be counted: of diffuse surfaces and metals.
     pub(super) brought: SpectrumLanes,
     pub(super) brings: [u32; LANES],
-    /// Paths whose light samples are drawn alone, and their way to the sky.
-    pub(super) light_alone: Vec<(u32, Option<PixelLine>)>,
-    pub(super) light_runs: Vec<Option<PixelRun>>,
+    /// Paths whose light samples are drawn alone.
+    pub(super) light_alone: Vec<u32>,
     /// Where several lights are sampled: of each path so many places, with the number of strata that picked the light; how many are taken;
     /// and a stratum's numbers.
     pub(super) light_picks: Vec<(PickedLight, u32)>,
@@ -259,7 +258,6 @@ impl Batch {
             brought: SpectrumLanes::ZERO,
             brings: [0; LANES],
             light_alone: Vec::new(),
-            light_runs: Vec::new(),
             light_picks: Vec::new(),
             light_counts: [0; LANES],
             light_pick: [0.0; LANES],

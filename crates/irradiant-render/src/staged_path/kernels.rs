@@ -6,7 +6,7 @@ use irradiant_core::bxdf::conductor::mirror_lobe;
 use irradiant_core::bxdf::fresnel::fresnel_conductor;
 use irradiant_core::bxdf::is_usable;
 use irradiant_core::geometry::Kernel;
-use irradiant_core::light::{ImageInfiniteLight, places_of_sky};
+use irradiant_core::light::{ImageInfiniteLight, SampleMode, places_of_sky};
 use irradiant_math::lanes::{WHOLE, whole};
 use irradiant_math::warp::cosine_hemisphere;
 use irradiant_math::{Point3, Vec3, offset_ray_origin};
@@ -74,7 +74,7 @@ impl Kernel for SampleSpheres<'_> {
     }
 }
 
-/// Directions to the points of the sky that were drawn.
+/// Points of the sky.
 pub(super) struct SampleSky<'a>(pub &'a mut Batch, pub usize, pub &'a ImageInfiniteLight);
 
 impl Kernel for SampleSky<'_> {
@@ -82,6 +82,8 @@ impl Kernel for SampleSky<'_> {
     #[inline(always)]
     fn run(self) {
         let Self(b, n, sky) = self;
+        let [u, v, ..] = &b.light.0;
+        b.sky.draw(sky, [u, v], SampleMode::Compensated);
         b.sky.directions(n, sky, &mut b.targets);
     }
 }

@@ -134,7 +134,7 @@ impl Batch {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> bool {
-        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(n, depth, scene, samples, radiance, stats);
+        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(depth, scene, samples, radiance, stats);
         if any {
             scene.geometry.level().run(Weigh(self, n));
         }
@@ -219,10 +219,10 @@ impl Batch {
     fn sample_lamps(&mut self, n: usize, scene: &Scene, samples: &[BatchSample]) -> bool {
         let sky = scene.lights.sky();
         self.light_alone.clear();
+        self.sky.begin();
         let (mut any_rectangle, mut any_sphere) = (false, false);
         for i in 0..n {
             self.spheres.forget(i);
-            self.sky.forget(i);
             if !(self.pmf[i] > 0.0) {
                 continue;
             }
@@ -240,8 +240,10 @@ impl Batch {
                 (self.is_delta[i], self.two_sided[i]) = (0, lamp.two_sided);
                 continue;
             }
-            let line = sky.filter(|(sky, _)| *sky == id).map(|(_, sky)| sky.seek(self.light.uv(i), MODE));
-            self.light_alone.push((i as u32, line));
+            match sky {
+                Some((sky, _)) if sky == id => self.sky.ask(i),
+                _ => self.light_alone.push(i as u32),
+            }
         }
         let level = scene.geometry.level();
         if any_rectangle {
@@ -249,46 +251,42 @@ impl Batch {
         }
         if any_sphere {
             level.run(SampleSpheres(self, n));
-            let within = (0..n as u32).filter(|&i| self.spheres.is_left(i as usize)).map(|i| (i, None));
-            self.light_alone.extend(within);
+            self.light_alone.extend((0..n as u32).filter(|&i| self.spheres.is_left(i as usize)));
         }
-        any_rectangle | any_sphere
+        let mut any_sky = false;
+        if let Some((_, sky)) = sky.filter(|_| !self.sky.wanted().is_empty()) {
+            level.run(SampleSky(self, n, sky));
+            for k in 0..self.sky.wanted().len() {
+                let i = self.sky.wanted()[k] as usize;
+                match self.sky.radiance(i, sky, &samples[self.sample[i] as usize].lambda) {
+                    Some(radiance) => {
+                        self.arriving.set(i, radiance);
+                        self.is_delta[i] = 0;
+                        any_sky = true;
+                    }
+                    None => self.pmf[i] = 0.0,
+                }
+            }
+        }
+        any_rectangle | any_sphere | any_sky
     }
 
     /// Light samples that are asked alone. Whether there are any.
     fn sample_alone(
         &mut self,
-        n: usize,
         depth: u32,
         scene: &Scene,
         samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) -> bool {
-        let sky = scene.lights.sky();
-        // The way to a point of the sky is waiting for memory: each step for all.
-        self.light_runs.clear();
-        self.light_runs.extend(
-            self.light_alone.iter().map(|&(_, line)| line.zip(sky).map(|(line, (_, sky))| sky.approach(line, MODE))),
-        );
         let may_pass = scene.materials.may_pass();
-        let (mut any, mut any_sky) = (false, false);
+        let mut any = false;
         for j in 0..self.light_alone.len() {
-            let ((i, _), run) = (self.light_alone[j], self.light_runs[j]);
-            let i = i as usize;
+            let i = self.light_alone[j] as usize;
             let s = self.sample[i] as usize;
             let lambda = &samples[s].lambda;
             let light = scene.lights.get(LightId(self.picked[i]));
-            if let (Some(run), Some((_, sky))) = (run, sky) {
-                if let Some(radiance) = self.sky.arrive(i, sky, run, lambda, MODE) {
-                    self.arriving.set(i, radiance);
-                    self.is_delta[i] = 0;
-                    any_sky = true;
-                } else {
-                    self.pmf[i] = 0.0;
-                }
-                continue;
-            }
             let sample = if may_pass && light.is_delta() {
                 radiance[s] += self.light_through_mixes(i, depth, scene, &samples[s], stats);
                 None
@@ -304,10 +302,7 @@ impl Batch {
             self.is_delta[i] = u32::from(sample.is_delta);
             any = true;
         }
-        if let (true, Some((_, sky))) = (any_sky, sky) {
-            scene.geometry.level().run(SampleSky(self, n, sky));
-        }
-        any | any_sky
+        any
     }
 
     /// A light sample of one path.
