@@ -80,7 +80,8 @@ pub(super) fn nowhere() -> TextureContext {
     TextureContext::without_footprint(Point3::ZERO, Normal3::ZERO, Point2::ZERO, 0)
 }
 
-/// A spectrum each, an array for each of its lanes.
+/// A spectrum each, an array for each of its lanes. Loops over whole spectra side by side are not made into vector code: the Cornell box took 1.23
+/// times the time.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct SpectrumLanes(pub [Floats; N_WAVELENGTHS]);

@@ -2,8 +2,8 @@
 //!
 //! The paths of a batch go from vertex to vertex together. A stage is a plain loop over the numbers of all paths, side by side in arrays
 //! that stay in the cache ([`lanes`](irradiant_math::lanes)), which calls the functions that code for one path calls and is compiled for the
-//! vectors of the processor ([`Kernel`]): random numbers, surfaces, points of lamps, scattered directions. Between them, path by path: rays,
-//! spectra, roulette.
+//! vectors of the processor ([`Kernel`]): random numbers, surfaces, points of lamps, scattered directions, what they bring,
+//! roulette. Between them, path by path: rays, materials.
 //!
 //! Only what is common is computed in lanes: flat triangles, diffuse surfaces and rough metals, the light tree, rectangular and spherical lamps, an image of
 //! the sky. For the rest each vertex is asked alone, by the functions that [`PathIntegrator::follow`] calls, and its answers are put into the
