@@ -139,7 +139,9 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
         ];
         let (mut found, strange) = triangle::intersect_lanes(vertices, self.sheared_origin, self.shear, t_far, active)?;
         if strange != 0 {
-            again_in_double(rays, which, &block.triangle(lane), t_far.to_array(), strange, &mut found);
+            let ends = t_far.to_array();
+            let shear = |i: usize| Shear::new(&rays[which[i] as usize]);
+            found = found.again_in_double(strange, |i| (block.triangle(lane), shear(i), ends[i]));
         }
         Some(found)
     }
@@ -153,25 +155,6 @@ fn along<E: Lanes>([is_x, is_y]: [u32; 2], [x, y, z]: [E; 3]) -> [E; 3] {
         E::select(is_x, z, E::select(is_y, x, y)),
         E::select(is_x, x, E::select(is_y, y, z)),
     ]
-}
-
-#[cold]
-#[inline(never)]
-fn again_in_double<E: Lanes<Array = [f32; PACKET]>>(
-    rays: &[Ray],
-    which: &[u16],
-    vertices: &[[f32; 3]; 3],
-    t: [f32; PACKET],
-    strange: u32,
-    found: &mut Candidates<E>,
-) {
-    for (i, &ray) in which.iter().enumerate().filter(|(i, _)| strange >> i & 1 != 0) {
-        let shear = Shear::new(&rays[ray as usize]);
-        if let Some(hit) = triangle::intersect(vertices, &shear).filter(|hit| hit.t <= t[i]) {
-            found.mask |= 1 << i;
-            (found.t[i], found.u[i], found.v[i]) = (hit.t, hit.u, hit.v);
-        }
-    }
 }
 
 /// A child to visit, and where each ray enters it: infinity for those that do not.

@@ -15,7 +15,7 @@ use super::{PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
-use crate::triangle::{self, Candidate, Shear};
+use crate::triangle::{self, Shear};
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = 16;
@@ -265,26 +265,9 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         ];
         let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0), active)?;
         if strange != 0 {
-            again_in_double(self.rays, &block.triangle(lane), t, strange, &mut found);
+            found = found.again_in_double(strange, |i| (block.triangle(lane), self.shear(i), t.0[i]));
         }
         Some(found)
-    }
-}
-
-#[cold]
-#[inline(never)]
-fn again_in_double<E: Lanes<Array = [f32; PACKET]>>(
-    rays: &[Ray],
-    vertices: &[[f32; 3]; 3],
-    t: &Column,
-    strange: u32,
-    found: &mut triangle::Candidates<E>,
-) {
-    for (i, ray) in rays.iter().take(PACKET).enumerate().filter(|(i, _)| strange >> i & 1 != 0) {
-        if let Some(hit) = triangle::intersect(vertices, &Shear::new(ray)).filter(|hit| hit.t <= t.0[i]) {
-            found.mask |= 1 << i;
-            (found.t[i], found.u[i], found.v[i]) = (hit.t, hit.u, hit.v);
-        }
     }
 }
 
@@ -424,8 +407,9 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                         let mut one = best.get(i);
                         let found = triangle::intersect_block::<B::Eight>(block, &packet.shear(i), one.t);
                         let Some(found) = found else { return };
+                        let all = found.spread();
                         each(found.mask, |lane| {
-                            let at = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                            let at = all.at(lane);
                             one.offer_triangle(leaves, &rays[i], block.id(lane), at, || block.triangle(lane));
                         });
                         best.set(i, one);
@@ -498,8 +482,9 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                     each(active, |i| {
                         let found = triangle::intersect_block::<B::Eight>(block, &packet.shear(i), t.0[i]);
                         let Some(found) = found else { return };
+                        let all = found.spread();
                         each(found.mask, |lane| {
-                            let at = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                            let at = all.at(lane);
                             blocked |= u32::from(counts(leaves, &rays[i], block, lane, at)) << i;
                         });
                     });

@@ -46,7 +46,7 @@ use super::{Best, PADDING, is_proper};
 use crate::node::{Block, Bvh, Child, LAST_USER, Node, STACK};
 use crate::prefetch;
 use crate::ray::{Closest, Leaves, Ray};
-use crate::triangle::{self, Candidate, Shear};
+use crate::triangle::{self, Shear};
 
 /// A stack of children still to visit. The builder guarantees that [`STACK`] entries are enough.
 pub(super) struct Stack<T> {
@@ -203,11 +203,12 @@ pub(super) fn closest_below<B: BoxTest, L: Leaves>(
         } else {
             loop {
                 let block: &Block = &bvh.blocks[index];
-                if let Some(mut hits) = triangle::intersect_block::<B::Eight>(block, &shear, best.t) {
-                    while hits.mask != 0 {
-                        let i = hits.mask.trailing_zeros() as usize & 7;
-                        hits.mask &= hits.mask - 1;
-                        let hit = Candidate { t: hits.t[i], u: hits.u[i], v: hits.v[i] };
+                if let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, best.t) {
+                    let (mut mask, all) = (found.mask, found.spread());
+                    while mask != 0 {
+                        let i = mask.trailing_zeros() as usize & 7;
+                        mask &= mask - 1;
+                        let hit = all.at(i);
                         best.offer_triangle(leaves, ray, block.id(i), hit, || block.triangle(i));
                     }
                 }
@@ -299,11 +300,12 @@ pub(super) fn any_below<B: BoxTest, L: Leaves>(bvh: &Bvh, mut child: Child, ray:
         } else {
             loop {
                 let block: &Block = &bvh.blocks[index];
-                if let Some(mut hits) = triangle::intersect_block::<B::Eight>(block, &shear, ray.t_max) {
-                    while hits.mask != 0 {
-                        let i = hits.mask.trailing_zeros() as usize & 7;
-                        hits.mask &= hits.mask - 1;
-                        let hit = Candidate { t: hits.t[i], u: hits.u[i], v: hits.v[i] };
+                if let Some(found) = triangle::intersect_block::<B::Eight>(block, &shear, ray.t_max) {
+                    let (mut mask, all) = (found.mask, found.spread());
+                    while mask != 0 {
+                        let i = mask.trailing_zeros() as usize & 7;
+                        mask &= mask - 1;
+                        let hit = all.at(i);
                         if counts(leaves, ray, block, i, hit) {
                             return true;
                         }
