@@ -168,6 +168,7 @@ struct Entry {
 #[inline(always)]
 pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     which: &[u16],
     octant: usize,
@@ -178,7 +179,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     let ray = |i: usize| rays[which[i] as usize];
     let mut best = Bests::new(t);
     let mut stack = Stack::new();
-    stack.set(0, Entry { near: Column([0.0; PACKET]), child: Child(0) });
+    stack.set(0, Entry { near: Column([0.0; PACKET]), child: start });
     let mut n = 1;
     let (padding, infinity) = (E::splat(PADDING), E::splat(f32::INFINITY));
     while n > 0 {
@@ -252,6 +253,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
 #[inline(always)]
 pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     which: &[u16],
     octant: usize,
@@ -263,7 +265,7 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     let all = (1u32 << which.len()) - 1;
     let mut blocked = 0u32;
     let mut stack: Stack<(Child, u32)> = Stack::new();
-    stack.set(0, (Child(0), all));
+    stack.set(0, (start, all));
     let mut n = 1;
     let (ends, padding) = (E::load(&ends.0), E::splat(PADDING));
     while n > 0 && blocked != all {

@@ -37,6 +37,11 @@ struct Entry {
     slot: u32,
 }
 
+impl Entry {
+    /// The parent of where the walk begins, whose box is not asked.
+    const NONE: u32 = u32::MAX;
+}
+
 /// One number of each ray.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
@@ -237,6 +242,15 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         near.le(far).mask()
     }
 
+    /// Bit `i` says that ray `i` enters what waits before `t[i]`.
+    #[inline(always)]
+    fn active(&self, bvh: &Bvh, entry: &Entry, t: &Column) -> u32 {
+        if entry.parent == Entry::NONE {
+            return E::splat(0.0).lt(E::load(&t.0)).mask();
+        }
+        self.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, t)
+    }
+
     /// The shear of a ray.
     #[inline(always)]
     fn shear(&self, ray: usize) -> Shear {
@@ -304,6 +318,14 @@ struct Waiting {
 }
 
 impl Waiting {
+    /// Only where to begin.
+    #[inline(always)]
+    fn at(start: Child) -> Self {
+        let mut stack = Stack::new();
+        stack.set(0, Entry { near: 0.0, child: start, parent: Entry::NONE, slot: 0 });
+        Self { stack, n: 1 }
+    }
+
     /// All children of `node` in `mask`, farthest first.
     #[inline(always)]
     fn push(&mut self, bvh: &Bvh, node: u32, mask: u32, near: &[f32; WIDTH]) {
@@ -355,6 +377,7 @@ pub(super) fn gathered(mask: u32, ray: impl Fn(usize) -> Ray) -> ([Ray; PACKET],
 #[inline(always)]
 pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     leaves: &L,
     out: &mut [Option<Closest<L::UserHit>>],
@@ -365,14 +388,12 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     let Some((packet, t)) = Packet::<E, B>::new(rays) else { return false };
     let mut far = t.greatest();
     let mut best = Bests::new(t);
-    let mut waiting = Waiting { stack: Stack::new(), n: 0 };
-    let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
-    waiting.push(bvh, 0, mask, &near);
+    let mut waiting = Waiting::at(start);
     while let Some(entry) = waiting.pop() {
         if entry.near > far * PADDING {
             continue;
         }
-        let active = packet.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, &best.t);
+        let active = packet.active(bvh, &entry, &best.t);
         if active == 0 {
             continue;
         }
@@ -432,6 +453,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
 #[inline(always)]
 pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     leaves: &L,
     out: &mut [bool],
@@ -442,12 +464,10 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     // Rays that have met something end before they begin.
     let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
     let mut far = t.greatest();
-    let mut waiting = Waiting { stack: Stack::new(), n: 0 };
+    let mut waiting = Waiting::at(start);
     out.fill(false);
-    let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
-    waiting.push(bvh, 0, mask, &near);
     while let Some(entry) = waiting.pop() {
-        let active = packet.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, &t);
+        let active = packet.active(bvh, &entry, &t);
         if active == 0 {
             continue;
         }

@@ -145,7 +145,7 @@ impl<U: Copy> Bests<U> {
             leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
             for (&i, hit) in which[..n].iter().zip(hits) {
                 let mut one = self.get(i);
-                one.offer_user_hit(user & !LAST_USER, hit);
+                one.offer_user_hit(leaves, user & !LAST_USER, hit);
                 self.set(i, one);
             }
             if user & LAST_USER != 0 {
@@ -173,6 +173,9 @@ pub(super) fn stopped_by_users<L: Leaves>(
     let mut stopped = 0;
     for index in leaf.index().. {
         let user = bvh.users[index];
+        if active & !stopped == 0 {
+            break;
+        }
         let (rays, which, n) = gathered(active & !stopped, &ray);
         let mut met = [false; PACKET];
         leaves.occluded_many(user & !LAST_USER, &rays[..n], &mut met[..n]);

@@ -88,14 +88,20 @@ fn key(near: f32, child: Child) -> u64 {
 }
 
 #[inline(always)]
-pub(super) fn closest<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
-    if is_proper(ray) { closest_of_proper::<B, L>(bvh, ray, leaves) } else { None }
+pub(super) fn closest<B: BoxTest, L: Leaves>(
+    bvh: &Bvh,
+    start: Child,
+    ray: &Ray,
+    leaves: &L,
+) -> Option<Closest<L::UserHit>> {
+    if is_proper(ray) { closest_of_proper::<B, L>(bvh, start, ray, leaves) } else { None }
 }
 
 /// The same, when the ray is known to be proper.
 #[inline(always)]
 pub(super) fn closest_of_proper<B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     ray: &Ray,
     leaves: &L,
 ) -> Option<Closest<L::UserHit>> {
@@ -103,7 +109,7 @@ pub(super) fn closest_of_proper<B: BoxTest, L: Leaves>(
         return None;
     }
     let mut best = Best::new(ray.t_max);
-    closest_below::<B, L>(bvh, Child(0), ray, leaves, &mut best);
+    closest_below::<B, L>(bvh, start, ray, leaves, &mut best);
     best.finish()
 }
 
@@ -251,14 +257,14 @@ pub(super) fn prefetch(bvh: &Bvh, child: Child) {
 }
 
 #[inline(always)]
-pub(super) fn any<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
-    is_proper(ray) && any_of_proper::<B, L>(bvh, ray, leaves)
+pub(super) fn any<B: BoxTest, L: Leaves>(bvh: &Bvh, start: Child, ray: &Ray, leaves: &L) -> bool {
+    is_proper(ray) && any_of_proper::<B, L>(bvh, start, ray, leaves)
 }
 
 /// The same, when the ray is known to be proper.
 #[inline(always)]
-pub(super) fn any_of_proper<B: BoxTest, L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
-    !bvh.nodes.is_empty() && any_below::<B, L>(bvh, Child(0), ray, leaves)
+pub(super) fn any_of_proper<B: BoxTest, L: Leaves>(bvh: &Bvh, start: Child, ray: &Ray, leaves: &L) -> bool {
+    !bvh.nodes.is_empty() && any_below::<B, L>(bvh, start, ray, leaves)
 }
 
 /// Whether the ray meets anything below `child`.
