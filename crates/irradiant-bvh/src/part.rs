@@ -81,7 +81,7 @@ pub fn braid<'a>(
 
 impl Bvh {
     /// What a part that is a node consists of, and the boxes.
-    fn parts_below(&self, Part(child): Part) -> impl Iterator<Item = (Part, Box3)> {
+    pub(crate) fn parts_below(&self, Part(child): Part) -> impl Iterator<Item = (Part, Box3)> {
         let node = if child.is_leaf() { None } else { self.nodes.get(child.index()) };
         node.into_iter().flat_map(|node| {
             (0..WIDTH).filter(|&i| !node.is_unused(i)).map(|i| {

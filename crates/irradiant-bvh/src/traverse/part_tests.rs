@@ -2,7 +2,7 @@
 //!
 //! Seen to fail when broken: parts of one instance in the order of their boxes; one part forgotten; packets and crowds that begin at the top.
 
-use super::tests::{Random, Soup, ball, lattice_soup, random_soup, ray_at};
+use super::tests::{Random, Soup, ball, lattice_soup, random_soup, ray_at, triangle_hit};
 use super::*;
 use crate::ray::{Hit, TrianglesOnly};
 use crate::{Braid, BuildInput, BuildSettings, braid};
@@ -133,6 +133,53 @@ fn parts_meet_what_whole_instances_meet() {
     check("large triangles", &random_soup(60, 1.0, 1.0, 2), 60);
     check("coincident triangles", &lattice_soup(60, 3), 60);
     check("a ball", &ball(12, 6), 60);
+}
+
+#[test]
+fn walks_that_begin_at_a_part_meet_what_is_there_and_no_more() {
+    for soup in [random_soup(300, 0.2, 1.0, 9), lattice_soup(40, 3)] {
+        let tree = soup.build();
+        let parts: Vec<Part> = tree.parts_below(Part::ALL).map(|(part, _)| part).collect();
+        assert!(parts.len() > 2 && tree.sorts_rays(Level::Neon) == (soup.triangles.len() < 100));
+        let mut random = Random(3);
+        let mut differ = 0;
+        for batch in 0..100 {
+            let first = ray_at(&soup, 1.0, &mut random);
+            let aside = |random: &mut Random| random.point().map(|x| 0.01 * x);
+            let rays: Vec<Ray> = (0..32)
+                .map(|_| match (batch % 2, aside(&mut random)) {
+                    (0, by) => Ray { d: [0, 1, 2].map(|k| first.d[k] + by[k]), ..first },
+                    _ => ray_at(&soup, 1.0, &mut random),
+                })
+                .collect();
+            let of = |part: Part, level: Level| {
+                rays.iter().map(|ray| triangle_hit(tree.intersect_part(part, level, ray, &TrianglesOnly))).collect()
+            };
+            let whole: Vec<Option<Hit>> = of(Part::ALL, Level::Scalar);
+            let mut nearest = vec![None; rays.len()];
+            for &part in &parts {
+                let expected: Vec<Option<Hit>> = of(part, Level::Scalar);
+                differ += expected.iter().zip(&whole).filter(|(a, b)| a != b).count();
+                for (nearest, hit) in nearest.iter_mut().zip(&expected) {
+                    let key = |h: &Option<Hit>| h.map_or((u32::MAX, 0), |h| (h.t.to_bits(), h.primitive));
+                    *nearest = if key(hit) < key(nearest) { *hit } else { *nearest };
+                }
+                let met: Vec<bool> = expected.iter().map(Option::is_some).collect();
+                for level in Level::available() {
+                    let (mut closest, mut any) = (vec![None; rays.len()], vec![false; rays.len()]);
+                    tree.intersect_part_batch(part, level, &rays, &TrianglesOnly, &mut closest);
+                    tree.occluded_part_batch(part, level, &rays, &TrianglesOnly, &mut any);
+                    let closest: Vec<_> = closest.into_iter().map(triangle_hit).collect();
+                    let occluded = rays.iter().map(|ray| tree.occluded_part(part, level, ray, &TrianglesOnly));
+                    assert_eq!(of(part, level), expected, "{level:?}, batch {batch}");
+                    assert_eq!(closest, expected, "{level:?}, batch {batch}");
+                    assert_eq!((occluded.collect(), any), (met.clone(), met.clone()), "{level:?}, batch {batch}");
+                }
+            }
+            assert_eq!(nearest, whole, "batch {batch}");
+        }
+        assert!(differ > 1000, "{differ}");
+    }
 }
 
 #[test]
