@@ -117,8 +117,7 @@ impl<'a> Tree<'a> {
             (vec![over(&meshes)], vec![], None)
         } else {
             let parts: Vec<Bvh> = meshes.iter().map(|m| over(std::slice::from_ref(m))).collect();
-            let place =
-                |p: &Placement, bounds: &[V; 2]| bounds.map(|corner| add(p.origin, scale(corner, p.size)));
+            let place = |p: &Placement, bounds: &[V; 2]| bounds.map(|corner| add(p.origin, scale(corner, p.size)));
             // A box that is scaled and moved is rounded: an ulp or two of slack.
             let slack = |[lo, hi]: [V; 2]| {
                 let pad = |x: f32, y: f32| 4.0 * f32::EPSILON * (x.abs() + y.abs());

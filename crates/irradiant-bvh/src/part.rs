@@ -28,12 +28,12 @@ pub struct Braid {
 
 type Box3 = [[f32; 3]; 2];
 
-/// An instance, or a part of one, may be opened if its box has this share of the area of the box of everything, and is met by the boxes of so many
-/// others.
+/// An instance, or a part of one, is opened if its box has this share of the area of the box of everything, and the boxes of so many others
+/// meet it.
 const LARGE: f32 = 1.0 / 64.0;
 const COMPANY: usize = 16;
-/// Opened instances, and parts of each, at most.
-const OPENED: usize = 64;
+/// Large instances that are looked at, and parts of each, at most: the work is linear in the number of boxes.
+const LOOKED_AT: usize = 256;
 const PARTS: usize = 64;
 
 /// In the order of `boxes`, which are those of user primitives: each of them, or the parts of it. Only those are opened of which `tree_of` gives
@@ -46,19 +46,20 @@ pub fn braid<'a>(
     outside: impl Fn(usize, &Box3) -> Box3,
 ) -> Vec<Braid> {
     let least = LARGE * half_area(&boxes.iter().fold(EMPTY, union));
+    // A box meets that of its own instance too.
     let is_crowded =
         |b: &Box3| half_area(b) >= least && boxes.iter().filter(|other| overlap(b, other)).nth(COMPANY).is_some();
     let mut braids = Vec::with_capacity(boxes.len());
-    let mut opened = 0;
+    let mut looked_at = 0;
     for (i, bounds) in boxes.iter().enumerate() {
         let first = braids.len();
         let braid = |(part, bounds)| Braid { instance: i as u32, part, bounds };
         braids.push(braid((Part::ALL, *bounds)));
-        if opened == OPENED || !is_crowded(bounds) {
+        if looked_at == LOOKED_AT || half_area(bounds) < least {
             continue;
         }
         let Some(tree) = tree_of(i) else { continue };
-        opened += 1;
+        looked_at += 1;
         let mut next = first;
         while next < braids.len() && braids.len() - first + WIDTH <= PARTS {
             let part = braids[next].part;

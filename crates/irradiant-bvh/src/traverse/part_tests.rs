@@ -1,6 +1,7 @@
 //! Trees over instances of which some are opened, against trees over whole ones. Exact: false alarms are impossible.
 //!
-//! Seen to fail when broken: parts of one instance in the order of their boxes; one part forgotten; packets and crowds that begin at the top.
+//! Seen to fail when broken: parts of one instance in the order of their boxes; one part forgotten; another instance opened instead; packets, crowds
+//! or single rays that begin at the top; parts that are nowhere.
 
 use super::tests::{Random, Soup, ball, lattice_soup, random_soup, ray_at, triangle_hit};
 use super::*;

@@ -1,6 +1,6 @@
 //! Scenes with instances that are opened, against each instance asked by itself: exact, so no false alarms.
 //!
-//! Seen to fail when broken: ties between parts of one instance in the order of the parts; whole instances counted for each part.
+//! Seen to fail when broken: parts counted as primitives; boxes of parts left in the space of their group.
 
 use super::*;
 use crate::geometry::accel::{GroupLeaves, User, to_tree};
@@ -53,7 +53,7 @@ fn opened_instances_meet_what_they_meet_by_themselves() {
                 let group = &g.groups[instance.group as usize];
                 let leaves = GroupLeaves { geometry: &g, group, alpha: &NoAlphaTextures };
                 let local = instance.ray_to_group(&to_tree(&ray, t_max));
-                let hit = group.tree.intersect(level, &local, &leaves).map(crate::geometry::hit_of);
+                let hit = group.tree.intersect(level, &local, &leaves).map(hit_of);
                 if let Some(hit) = hit.filter(|h| expected.is_none_or(|e| h.t < e.t)) {
                     expected = Some(Hit { instances: [i as u32, NO_INSTANCE], ..hit });
                 }
