@@ -3,7 +3,9 @@
 use super::sets::{Geometry, Placement};
 use crate::vector::{V, add, scale, sub};
 use cpu_time::ProcessTime;
-use irradiant_bvh::{BuildInput, BuildSettings, Bvh, Closest, Hit, Leaves, Level, Mesh, Ray, TrianglesOnly};
+use irradiant_bvh::{
+    Braid, BuildInput, BuildSettings, Bvh, Closest, Hit, Leaves, Level, Mesh, Part, Ray, TrianglesOnly, braid,
+};
 use std::time::Instant;
 
 /// A tree over triangles, or one over instances of such.
@@ -11,6 +13,7 @@ pub struct Tree<'a> {
     geometry: &'a Geometry,
     /// One, or one for each mesh that is instanced.
     parts: Vec<Bvh>,
+    placed: Vec<Placed>,
     top: Option<Bvh>,
     level: Level,
     /// Of the build, on the wall.
@@ -19,9 +22,20 @@ pub struct Tree<'a> {
     pub cpu_seconds: f64,
 }
 
+/// An instance, or a part of one, as the tree over them knows it.
+struct Placed {
+    mesh: u32,
+    part: Part,
+    origin: V,
+    /// How much smaller it is inside.
+    shrink: f32,
+    /// Index among the placements.
+    instance: u32,
+}
+
 struct Instances<'a> {
     parts: &'a [Bvh],
-    placements: &'a [Placement],
+    placed: &'a [Placed],
     level: Level,
 }
 
@@ -30,21 +44,21 @@ const MANY: usize = 16;
 
 impl Instances<'_> {
     /// The same for up to [`MANY`] rays.
-    fn all_inside(&self, user: u32, rays: &[Ray]) -> (&Bvh, [Ray; MANY]) {
+    fn all_inside(&self, user: u32, rays: &[Ray]) -> (&Bvh, Part, [Ray; MANY]) {
         let mut local = [Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; MANY];
         for (local, ray) in local.iter_mut().zip(rays) {
-            *local = self.inside(user, ray).1;
+            *local = self.inside(user, ray).2;
         }
-        (&self.parts[self.placements[user as usize].mesh], local)
+        let p = &self.placed[user as usize];
+        (&self.parts[p.mesh as usize], p.part, local)
     }
 
     /// The ray in the space of an instance: distances along it stay the same.
     #[inline]
-    fn inside(&self, user: u32, ray: &Ray) -> (&Bvh, Ray) {
-        let p = &self.placements[user as usize];
-        let shrink = 1.0 / p.size;
-        let (o, d) = (scale(sub(ray.o, p.origin), shrink), scale(ray.d, shrink));
-        (&self.parts[p.mesh], Ray { o, t_max: ray.t_max, d, time: ray.time })
+    fn inside(&self, user: u32, ray: &Ray) -> (&Bvh, Part, Ray) {
+        let p = &self.placed[user as usize];
+        let (o, d) = (scale(sub(ray.o, p.origin), p.shrink), scale(ray.d, p.shrink));
+        (&self.parts[p.mesh as usize], p.part, Ray { o, t_max: ray.t_max, d, time: ray.time })
     }
 }
 
@@ -52,23 +66,28 @@ impl Leaves for Instances<'_> {
     type UserHit = Hit;
 
     fn intersect(&self, user: u32, ray: &Ray) -> Option<(f32, Hit)> {
-        let (part, ray) = self.inside(user, ray);
-        match part.intersect(self.level, &ray, &TrianglesOnly)? {
+        let (tree, part, ray) = self.inside(user, ray);
+        match tree.intersect_part(part, self.level, &ray, &TrianglesOnly)? {
             Closest::Triangle(hit) => Some((hit.t, hit)),
             Closest::User { .. } => None,
         }
     }
 
     fn occluded(&self, user: u32, ray: &Ray) -> bool {
-        let (part, ray) = self.inside(user, ray);
-        part.occluded(self.level, &ray, &TrianglesOnly)
+        let (tree, part, ray) = self.inside(user, ray);
+        tree.occluded_part(part, self.level, &ray, &TrianglesOnly)
+    }
+
+    fn precedes(&self, (a, hit): (u32, &Hit), (b, other): (u32, &Hit)) -> bool {
+        let instance = |user: u32| self.placed[user as usize].instance;
+        (instance(a), hit.primitive) < (instance(b), other.primitive)
     }
 
     // As in irradiant-core: rays that reach an instance together go on together.
     fn intersect_many(&self, user: u32, rays: &[Ray], hits: &mut [Option<(f32, Hit)>]) {
-        let (part, rays) = self.all_inside(user, rays);
+        let (tree, part, rays) = self.all_inside(user, rays);
         let mut found = [None; MANY];
-        part.intersect_batch(self.level, &rays[..hits.len()], &TrianglesOnly, &mut found[..hits.len()]);
+        tree.intersect_part_batch(part, self.level, &rays[..hits.len()], &TrianglesOnly, &mut found[..hits.len()]);
         for (hit, found) in hits.iter_mut().zip(found) {
             *hit = match found {
                 Some(Closest::Triangle(hit)) => Some((hit.t, hit)),
@@ -78,8 +97,8 @@ impl Leaves for Instances<'_> {
     }
 
     fn occluded_many(&self, user: u32, rays: &[Ray], out: &mut [bool]) {
-        let (part, rays) = self.all_inside(user, rays);
-        part.occluded_batch(self.level, &rays[..out.len()], &TrianglesOnly, out);
+        let (tree, part, rays) = self.all_inside(user, rays);
+        tree.occluded_part_batch(part, self.level, &rays[..out.len()], &TrianglesOnly, out);
     }
 }
 
@@ -94,35 +113,42 @@ impl<'a> Tree<'a> {
         let (wall, cpu) = (Instant::now(), ProcessTime::now());
         let over = |meshes: &[Mesh]| Bvh::build(&BuildInput { meshes, user_boxes: &[] }, &settings);
         let meshes: Vec<Mesh> = geometry.meshes.iter().map(mesh_of).collect();
-        let (parts, top) = if geometry.placements.is_empty() {
-            (vec![over(&meshes)], None)
+        let (parts, placed, top) = if geometry.placements.is_empty() {
+            (vec![over(&meshes)], vec![], None)
         } else {
             let parts: Vec<Bvh> = meshes.iter().map(|m| over(std::slice::from_ref(m))).collect();
-            let place = |p: &Placement| {
-                let bounds = parts[p.mesh].bounds().unwrap_or_default();
-                bounds.map(|corner| add(p.origin, scale(corner, p.size)))
-            };
+            let place = |p: &Placement, bounds: &[V; 2]| bounds.map(|corner| add(p.origin, scale(corner, p.size)));
             // A box that is scaled and moved is rounded: an ulp or two of slack.
             let slack = |[lo, hi]: [V; 2]| {
                 let pad = |x: f32, y: f32| 4.0 * f32::EPSILON * (x.abs() + y.abs());
                 [std::array::from_fn(|i| lo[i] - pad(lo[i], hi[i])), std::array::from_fn(|i| hi[i] + pad(lo[i], hi[i]))]
             };
-            let boxes: Vec<[V; 2]> = geometry.placements.iter().map(|p| slack(place(p))).collect();
+            let whole = |p: &Placement| slack(place(p, &parts[p.mesh].bounds().unwrap_or_default()));
+            let boxes: Vec<[V; 2]> = geometry.placements.iter().map(whole).collect();
+            let tree_of = |i: usize| Some(&parts[geometry.placements[i].mesh]);
+            let braids = braid(&boxes, tree_of, |i, inside| slack(place(&geometry.placements[i], inside)));
+            let placed = |b: &Braid| {
+                let p = &geometry.placements[b.instance as usize];
+                let (mesh, shrink) = (p.mesh as u32, 1.0 / p.size);
+                Placed { mesh, part: b.part, origin: p.origin, shrink, instance: b.instance }
+            };
+            let placed = braids.iter().map(placed).collect();
+            let boxes: Vec<[V; 2]> = braids.iter().map(|b| b.bounds).collect();
             let top = Bvh::build(&BuildInput { meshes: &[], user_boxes: &boxes }, &settings);
-            (parts, Some(top))
+            (parts, placed, Some(top))
         };
         let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-        Self { geometry, parts, top, level: Level::detect(), seconds, cpu_seconds }
+        Self { geometry, parts, placed, top, level: Level::detect(), seconds, cpu_seconds }
     }
 
     /// Bytes of nodes and leaves, and of placements where there are any.
     pub fn memory_bytes(&self) -> usize {
         let trees: usize = self.parts.iter().chain(&self.top).map(Bvh::memory_bytes).sum();
-        trees + self.geometry.placements.len() * size_of::<Placement>()
+        trees + size_of_val(&self.placed[..])
     }
 
     fn instances(&self) -> Instances<'_> {
-        Instances { parts: &self.parts, placements: &self.geometry.placements, level: self.level }
+        Instances { parts: &self.parts, placed: &self.placed, level: self.level }
     }
 
     /// Distance of the closest hit, and the triangle there.
@@ -142,8 +168,8 @@ impl<'a> Tree<'a> {
         };
         let Closest::User { t, user, hit } = top.intersect(self.level, ray, &self.instances())? else { return None };
         // Instances are not turned, so that their triangles have the same normals.
-        let placement = &self.geometry.placements[user as usize];
-        Some((t, corners(&self.geometry.meshes[placement.mesh], hit.primitive as usize)))
+        let mesh = &self.geometry.meshes[self.placed[user as usize].mesh as usize];
+        Some((t, corners(mesh, hit.primitive as usize)))
     }
 
     /// Distances to what the rays meet first, infinite for none; one at a time.

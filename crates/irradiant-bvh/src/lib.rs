@@ -17,6 +17,7 @@
 //! - `triangle`: the watertight test, scalar and eight at a time.
 //! - `traverse`: the walk, once for closest hits and once for any hit, for one ray, for packets of sixteen that travel together, and for crowds of
 //!   sixteen that go anywhere.
+//! - `part`: walks that begin below the top, and which parts of instances to put in a tree over them.
 //! - `lanes`: four floats, or eight; `prefetch`: asking for memory early; `pages`: large arrays.
 //!
 //! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);
@@ -29,6 +30,7 @@ mod lanes;
 mod level;
 mod node;
 mod pages;
+mod part;
 mod prefetch;
 mod ray;
 mod traverse;
@@ -39,5 +41,6 @@ pub use build::{BuildInput, BuildReport, BuildSettings, Mesh};
 pub use level::{Kernel, Level};
 pub use node::Bvh;
 pub use pages::vec_on_large_pages;
+pub use part::{Braid, Part, braid};
 pub use prefetch::prefetch_read;
 pub use ray::{Closest, Hit, Leaves, Ray, TrianglesOnly};

@@ -89,6 +89,14 @@ pub trait Leaves {
     /// Whether user primitive `user` has any hit with `0 < t < ray.t_max`.
     fn occluded(&self, user: u32, ray: &Ray) -> bool;
 
+    /// Of hits of two user primitives at exactly the same `t`, whether `a` counts rather than `b`.
+    ///
+    /// To be written where parts of one instance are user primitives: then by what was met inside.
+    #[inline]
+    fn precedes(&self, a: (u32, &Self::UserHit), b: (u32, &Self::UserHit)) -> bool {
+        a.0 < b.0
+    }
+
     /// For each ray what [`intersect`](Self::intersect) gives: `hits[i]` answers `rays[i]`, and is `None` before. Asked for
     /// rays of a batch that travel together, at most sixteen; worth writing for instances.
     #[inline]

@@ -146,11 +146,59 @@ fn intersect_in_double(sheared: &[[f32; 3]; 3], sz: f32) -> Option<Candidate> {
 }
 
 /// Candidates among lanes: bit `i` of `mask` says whether lane `i` is one.
-pub(crate) struct Candidates<F: Lanes> {
+///
+/// Lanes and not arrays: a copy of an array that was just written lane by lane waits until all of it is in the cache.
+#[derive(Clone, Copy)]
+pub(crate) struct Candidates<F> {
     pub mask: u32,
-    pub t: F::Array,
-    pub u: F::Array,
-    pub v: F::Array,
+    pub t: F,
+    pub u: F,
+    pub v: F,
+}
+
+impl<F: Lanes> Candidates<F> {
+    /// To be looked at one by one.
+    #[inline(always)]
+    pub fn spread(&self) -> Spread<F::Array> {
+        Spread { t: self.t.to_array(), u: self.u.to_array(), v: self.v.to_array() }
+    }
+
+    /// With `hit` in a lane.
+    fn with(&self, lane: usize, hit: Candidate) -> Self {
+        let mut all = self.spread();
+        (all.t[lane], all.u[lane], all.v[lane]) = (hit.t, hit.u, hit.v);
+        Self { mask: self.mask | 1 << lane, t: F::load(&all.t), u: F::load(&all.u), v: F::load(&all.v) }
+    }
+
+    /// With what [`intersect`] finds with `t <= t_far` in some `lanes`, given the vertices, shear and `t_far` there.
+    #[cold]
+    #[inline(never)]
+    pub fn again_in_double(mut self, mut lanes: u32, of: impl Fn(usize) -> ([[f32; 3]; 3], Shear, f32)) -> Self {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let (vertices, shear, t_far) = of(lane);
+            if let Some(hit) = intersect(&vertices, &shear).filter(|hit| hit.t <= t_far) {
+                self = self.with(lane, hit);
+            }
+        }
+        self
+    }
+}
+
+/// [`Candidates`] in arrays.
+pub(crate) struct Spread<A> {
+    t: A,
+    u: A,
+    v: A,
+}
+
+impl<A: std::ops::Index<usize, Output = f32>> Spread<A> {
+    /// That of a lane.
+    #[inline(always)]
+    pub fn at(&self, lane: usize) -> Candidate {
+        Candidate { t: self.t[lane], u: self.u[lane], v: self.v[lane] }
+    }
 }
 
 /// The triangles of a block at once: the candidates with `t <= t_far`, bit for bit those of [`intersect`]; `None` if
@@ -165,7 +213,7 @@ pub(crate) fn intersect_block<E: Eight>(block: &Block, shear: &Shear, t_far: f32
     let y = (E::load(&block.vertices[ky]) - oy) + sy * z;
     let (mut found, strange) = intersect_sheared(E::choose([x, y, z], block.corners), sz, E::splat(t_far), E::ALL)?;
     if strange != 0 {
-        again_in_double(block, shear, t_far, strange, &mut found);
+        found = found.again_in_double(strange, |lane| (block.triangle(lane), *shear, t_far));
     }
     Some(found)
 }
@@ -231,20 +279,5 @@ fn intersect_sheared<F: Lanes>(
     let delta_e = F::splat(2.0) * ((g2 * max_x * max_y + delta_y * max_x) + delta_x * max_y);
     let delta_t = F::splat(3.0) * ((g3 * max_e * max_z + delta_e * max_z) + delta_z * max_e) * inverse.abs();
     inside &= delta_t.lt(t).mask();
-    let found =
-        Candidates { mask: inside, t: t.to_array(), u: (e1 * inverse).to_array(), v: (e2 * inverse).to_array() };
-    Some((found, strange))
-}
-
-#[cold]
-#[inline(never)]
-fn again_in_double<E: Eight>(block: &Block, shear: &Shear, t_far: f32, mut lanes: u32, out: &mut Candidates<E>) {
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros() as usize;
-        lanes &= lanes - 1;
-        if let Some(hit) = intersect(&block.triangle(lane), shear).filter(|hit| hit.t <= t_far) {
-            out.mask |= 1 << lane;
-            (out.t[lane], out.u[lane], out.v[lane]) = (hit.t, hit.u, hit.v);
-        }
-    }
+    Some((Candidates { mask: inside, t, u: e1 * inverse, v: e2 * inverse }, strange))
 }

@@ -6,8 +6,10 @@
 use super::gather::Ref;
 use crate::lanes::{Lanes, Native};
 
-/// Ranges of this many triangles or fewer are not split: connected ones fit one block.
+/// Ranges of this many triangles or fewer are not split, unless large: connected ones fit one block.
 const LEAF: usize = 5;
+/// A box is large if it has this share of the area of the box of everything. The walls of a room are few triangles that every ray would meet all together.
+const LARGE: f64 = 1.0 / 16.0;
 /// Bins along an axis at most.
 const MAX_BINS: usize = 64;
 /// Subtrees deeper than this are split in halves: it bounds the recursion for boxes whose sizes span hundreds of octaves.
@@ -39,8 +41,20 @@ pub(crate) struct Node {
 /// Splits `refs` (reordering them) into a tree. `refs` must not be empty.
 pub(crate) fn build(refs: &mut [Ref], split: Split) -> Vec<Node> {
     let mut nodes = Vec::new();
-    subtree(refs, split, 0, &mut nodes, &mut Scratch::new());
+    let everything = refs.iter().fold(Bounds::empty(), |mut all, r| {
+        all.grow(r.lo(), r.hi());
+        all
+    });
+    let rules = Rules { split, large: LARGE * everything.half_area() };
+    subtree(refs, &rules, 0, &mut nodes, &mut Scratch::new());
     nodes
+}
+
+/// The same for all subtrees.
+struct Rules {
+    split: Split,
+    /// Half the area of the boxes that are large.
+    large: f64,
 }
 
 /// Lower and upper corners, four lanes each.
@@ -60,9 +74,13 @@ impl Bounds {
         self.lo = self.lo.min(lo);
         self.hi = self.hi.max(hi);
     }
+    fn half_area(&self) -> f64 {
+        let [x, y, z, _] = (self.hi - self.lo).to_array().map(f64::from);
+        x * y + y * z + z * x
+    }
 }
 
-fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>, scratch: &mut Scratch) {
+fn subtree(refs: &mut [Ref], rules: &Rules, depth: usize, nodes: &mut Vec<Node>, scratch: &mut Scratch) {
     let mut boxes = Bounds::empty();
     let mut centres = Bounds::empty();
     for r in refs.iter() {
@@ -75,10 +93,10 @@ fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>, 
     let ([lx, ly, lz, _], [hx, hy, hz, _]) = (boxes.lo.to_array(), boxes.hi.to_array());
     nodes.push(Node { lo: [lx, ly, lz], right: 0, hi: [hx, hy, hz], count: refs.len() as u32 });
     let users = if refs.len() <= LEAF { refs.iter().filter(|r| r.is_user()).count() } else { 0 };
-    if refs.len() == 1 || (refs.len() <= LEAF && users == 0) {
+    if refs.len() == 1 || (refs.len() <= LEAF && users == 0 && boxes.half_area() < rules.large) {
         return;
     }
-    let middle = match split {
+    let middle = match rules.split {
         Split::Sah if depth < MAX_SAH_DEPTH => best_split(refs, &boxes, &centres, scratch),
         Split::Sah | Split::Halve => None,
     };
@@ -87,15 +105,15 @@ fn subtree(refs: &mut [Ref], split: Split, depth: usize, nodes: &mut Vec<Node>, 
     if left.len() + right.len() > PARALLEL {
         let mut second = Vec::new();
         rayon::join(
-            || subtree(left, split, depth + 1, nodes, scratch),
-            || subtree(right, split, depth + 1, &mut second, &mut Scratch::new()),
+            || subtree(left, rules, depth + 1, nodes, scratch),
+            || subtree(right, rules, depth + 1, &mut second, &mut Scratch::new()),
         );
         nodes[at].right = (nodes.len() - at) as u32;
         nodes.append(&mut second);
     } else {
-        subtree(left, split, depth + 1, nodes, scratch);
+        subtree(left, rules, depth + 1, nodes, scratch);
         nodes[at].right = (nodes.len() - at) as u32;
-        subtree(right, split, depth + 1, nodes, scratch);
+        subtree(right, rules, depth + 1, nodes, scratch);
     }
 }
 

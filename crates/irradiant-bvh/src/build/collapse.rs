@@ -16,6 +16,9 @@ use crate::pages::vec_on_large_pages;
 /// "as with one slot fewer". With one slot, the number counts out of the eight of the new node.
 type Choices = [u8; 8];
 
+/// What each triangle adds to the cost of a leaf: it may be a candidate.
+const CANDIDATE: f32 = 0.02;
+
 struct Plan<'a> {
     tree: &'a [binary::Node],
     refs: &'a [Ref],
@@ -158,7 +161,7 @@ impl Plan<'_> {
         f64::from(if is_user {
             self.settings.user_cost * count as f32
         } else {
-            self.settings.block_cost * f32::max(1.0, count as f32 / self.per_block)
+            self.settings.block_cost * f32::max(1.0, count as f32 / self.per_block) + CANDIDATE * count as f32
         })
     }
 }

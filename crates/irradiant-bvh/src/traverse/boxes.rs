@@ -83,7 +83,7 @@ pub(crate) mod x86 {
     use super::*;
     use crate::lanes::{Avx, Avx512, Pair, Sse};
     use crate::level::Level;
-    use crate::node::Bvh;
+    use crate::node::{Bvh, Child};
     use crate::ray::{Closest, Leaves};
     use crate::traverse::{WIDER, crowd, packet, walk};
 
@@ -265,10 +265,16 @@ pub(crate) mod x86 {
         ($closest:ident, $any:ident, $closest_packet:ident, $any_packet:ident, $closest_crowd:ident, $any_crowd:ident, $wide:ty, $level:expr, $features:literal) => {
             #[inline]
             #[allow(unsafe_code)]
-            pub(crate) fn $closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+            pub(crate) fn $closest<L: Leaves>(
+                bvh: &Bvh,
+                start: Child,
+                ray: &Ray,
+                leaves: &L,
+            ) -> Option<Closest<L::UserHit>> {
                 #[target_feature(enable = $features)]
                 fn compiled<L: Leaves>(
                     bvh: &Bvh,
+                    start: Child,
                     ox: f32,
                     oy: f32,
                     oz: f32,
@@ -281,23 +287,24 @@ pub(crate) mod x86 {
                 ) -> Option<Closest<L::UserHit>> {
                     let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
-                        walk::closest_of_proper::<Fused, L>(bvh, ray, leaves)
+                        walk::closest_of_proper::<Fused, L>(bvh, start, ray, leaves)
                     } else {
-                        walk::closest::<Whole, L>(bvh, ray, leaves)
+                        walk::closest::<Whole, L>(bvh, start, ray, leaves)
                     }
                 }
                 assert!($level <= Level::detect());
                 let &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time } = ray;
                 // SAFETY: the machine has the features. Guard: `levels_beyond_the_machine_fall_back`.
-                unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
+                unsafe { compiled(bvh, start, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
             }
 
             #[inline]
             #[allow(unsafe_code)]
-            pub(crate) fn $any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
+            pub(crate) fn $any<L: Leaves>(bvh: &Bvh, start: Child, ray: &Ray, leaves: &L) -> bool {
                 #[target_feature(enable = $features)]
                 fn compiled<L: Leaves>(
                     bvh: &Bvh,
+                    start: Child,
                     ox: f32,
                     oy: f32,
                     oz: f32,
@@ -310,15 +317,15 @@ pub(crate) mod x86 {
                 ) -> bool {
                     let ray = &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time };
                     if Fused::suits(ray) {
-                        walk::any_of_proper::<Fused, L>(bvh, ray, leaves)
+                        walk::any_of_proper::<Fused, L>(bvh, start, ray, leaves)
                     } else {
-                        walk::any::<Whole, L>(bvh, ray, leaves)
+                        walk::any::<Whole, L>(bvh, start, ray, leaves)
                     }
                 }
                 assert!($level <= Level::detect());
                 let &Ray { o: [ox, oy, oz], t_max, d: [dx, dy, dz], time } = ray;
                 // SAFETY: as above.
-                unsafe { compiled(bvh, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
+                unsafe { compiled(bvh, start, ox, oy, oz, t_max, dx, dy, dz, time, leaves) }
             }
 
             entry_point!(
@@ -326,18 +333,19 @@ pub(crate) mod x86 {
                 $features,
                 fn $closest_packet<L>(
                     bvh: &Bvh,
+                    start: Child,
                     rays: &[Ray],
                     leaves: &L,
                     out: &mut [Option<Closest<L::UserHit>>],
                 ) -> bool {
-                    packet::closest::<$wide, Fused, L>(bvh, rays, leaves, out)
+                    packet::closest::<$wide, Fused, L>(bvh, start, rays, leaves, out)
                 }
             );
             entry_point!(
                 $level,
                 $features,
-                fn $any_packet<L>(bvh: &Bvh, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
-                    packet::any::<$wide, Fused, L>(bvh, rays, leaves, out)
+                fn $any_packet<L>(bvh: &Bvh, start: Child, rays: &[Ray], leaves: &L, out: &mut [bool]) -> bool {
+                    packet::any::<$wide, Fused, L>(bvh, start, rays, leaves, out)
                 }
             );
             entry_point!(
@@ -345,13 +353,14 @@ pub(crate) mod x86 {
                 $features,
                 fn $closest_crowd<L>(
                     bvh: &Bvh,
+                    start: Child,
                     rays: &[Ray],
                     which: &[u16],
                     octant: usize,
                     leaves: &L,
                     out: &mut [Option<Closest<L::UserHit>>],
                 ) -> () {
-                    crowd::closest::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out)
+                    crowd::closest::<$wide, Fused, L>(bvh, start, rays, which, octant, leaves, out)
                 }
             );
             entry_point!(
@@ -359,13 +368,14 @@ pub(crate) mod x86 {
                 $features,
                 fn $any_crowd<L>(
                     bvh: &Bvh,
+                    start: Child,
                     rays: &[Ray],
                     which: &[u16],
                     octant: usize,
                     leaves: &L,
                     out: &mut [bool],
                 ) -> () {
-                    crowd::any::<$wide, Fused, L>(bvh, rays, which, octant, leaves, out)
+                    crowd::any::<$wide, Fused, L>(bvh, start, rays, which, octant, leaves, out)
                 }
             );
         };

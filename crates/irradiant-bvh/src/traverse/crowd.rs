@@ -139,7 +139,9 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
         ];
         let (mut found, strange) = triangle::intersect_lanes(vertices, self.sheared_origin, self.shear, t_far, active)?;
         if strange != 0 {
-            again_in_double(rays, which, &block.triangle(lane), t_far.to_array(), strange, &mut found);
+            let ends = t_far.to_array();
+            let shear = |i: usize| Shear::new(&rays[which[i] as usize]);
+            found = found.again_in_double(strange, |i| (block.triangle(lane), shear(i), ends[i]));
         }
         Some(found)
     }
@@ -155,25 +157,6 @@ fn along<E: Lanes>([is_x, is_y]: [u32; 2], [x, y, z]: [E; 3]) -> [E; 3] {
     ]
 }
 
-#[cold]
-#[inline(never)]
-fn again_in_double<E: Lanes<Array = [f32; PACKET]>>(
-    rays: &[Ray],
-    which: &[u16],
-    vertices: &[[f32; 3]; 3],
-    t: [f32; PACKET],
-    strange: u32,
-    found: &mut Candidates<E>,
-) {
-    for (i, &ray) in which.iter().enumerate().filter(|(i, _)| strange >> i & 1 != 0) {
-        let shear = Shear::new(&rays[ray as usize]);
-        if let Some(hit) = triangle::intersect(vertices, &shear).filter(|hit| hit.t <= t[i]) {
-            found.mask |= 1 << i;
-            (found.t[i], found.u[i], found.v[i]) = (hit.t, hit.u, hit.v);
-        }
-    }
-}
-
 /// A child to visit, and where each ray enters it: infinity for those that do not.
 #[derive(Clone, Copy)]
 struct Entry {
@@ -185,6 +168,7 @@ struct Entry {
 #[inline(always)]
 pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     which: &[u16],
     octant: usize,
@@ -195,7 +179,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     let ray = |i: usize| rays[which[i] as usize];
     let mut best = Bests::new(t);
     let mut stack = Stack::new();
-    stack.set(0, Entry { near: Column([0.0; PACKET]), child: Child(0) });
+    stack.set(0, Entry { near: Column([0.0; PACKET]), child: start });
     let mut n = 1;
     let (padding, infinity) = (E::splat(PADDING), E::splat(f32::INFINITY));
     while n > 0 {
@@ -269,6 +253,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
 #[inline(always)]
 pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     which: &[u16],
     octant: usize,
@@ -280,7 +265,7 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     let all = (1u32 << which.len()) - 1;
     let mut blocked = 0u32;
     let mut stack: Stack<(Child, u32)> = Stack::new();
-    stack.set(0, (Child(0), all));
+    stack.set(0, (start, all));
     let mut n = 1;
     let (ends, padding) = (E::load(&ends.0), E::splat(PADDING));
     while n > 0 && blocked != all {

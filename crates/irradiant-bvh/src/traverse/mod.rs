@@ -37,11 +37,14 @@ mod batch_tests;
 #[cfg(test)]
 mod large_tests;
 #[cfg(test)]
+mod part_tests;
+#[cfg(test)]
 mod tests;
 
 use crate::lanes::{Lanes, Native};
 use crate::level::Level;
 use crate::node::Bvh;
+use crate::part::Part;
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::Candidate;
 
@@ -56,18 +59,30 @@ impl Bvh {
     /// Of several at exactly the same `t`, triangles come before user primitives, and lower indices before higher.
     #[inline]
     pub fn intersect<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+        self.intersect_part(Part::ALL, level, ray, leaves)
+    }
+
+    /// The same of a part of the tree.
+    #[inline]
+    pub fn intersect_part<L: Leaves>(
+        &self,
+        Part(start): Part,
+        level: Level,
+        ray: &Ray,
+        leaves: &L,
+    ) -> Option<Closest<L::UserHit>> {
         match level.min(Level::detect()) {
-            Level::Scalar => scalar::closest(self, ray, leaves),
-            Level::Neon => walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves),
+            Level::Scalar => scalar::closest(self, start, ray, leaves),
+            Level::Neon => walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
-            Level::Sse => walk::closest::<boxes::Halves<crate::lanes::Sse>, L>(self, ray, leaves),
+            Level::Sse => walk::closest::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::closest_avx2(self, ray, leaves),
+            Level::Avx2 => boxes::x86::closest_avx2(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => boxes::x86::closest_avx512(self, ray, leaves),
+            Level::Avx512 => boxes::x86::closest_avx512(self, start, ray, leaves),
             #[cfg(not(target_arch = "x86_64"))]
             Level::Sse | Level::Avx2 | Level::Avx512 => {
-                walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves)
+                walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves)
             }
         }
     }
@@ -75,18 +90,24 @@ impl Bvh {
     /// Whether `ray` meets anything.
     #[inline]
     pub fn occluded<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> bool {
+        self.occluded_part(Part::ALL, level, ray, leaves)
+    }
+
+    /// Whether `ray` meets anything in a part of the tree.
+    #[inline]
+    pub fn occluded_part<L: Leaves>(&self, Part(start): Part, level: Level, ray: &Ray, leaves: &L) -> bool {
         match level.min(Level::detect()) {
-            Level::Scalar => scalar::any(self, ray, leaves),
-            Level::Neon => walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves),
+            Level::Scalar => scalar::any(self, start, ray, leaves),
+            Level::Neon => walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
-            Level::Sse => walk::any::<boxes::Halves<crate::lanes::Sse>, L>(self, ray, leaves),
+            Level::Sse => walk::any::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::any_avx2(self, ray, leaves),
+            Level::Avx2 => boxes::x86::any_avx2(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => boxes::x86::any_avx512(self, ray, leaves),
+            Level::Avx512 => boxes::x86::any_avx512(self, start, ray, leaves),
             #[cfg(not(target_arch = "x86_64"))]
             Level::Sse | Level::Avx2 | Level::Avx512 => {
-                walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, ray, leaves)
+                walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves)
             }
         }
     }
@@ -150,7 +171,7 @@ impl<U: Copy> Best<U> {
     /// Asks about user primitive `index`.
     #[inline(always)]
     fn offer_user<L: Leaves<UserHit = U>>(&mut self, leaves: &L, ray: &Ray, index: u32) {
-        self.offer_user_hit(index, leaves.intersect(index, &self.ray_for_user(ray)));
+        self.offer_user_hit(leaves, index, leaves.intersect(index, &self.ray_for_user(ray)));
     }
 
     /// The ray to ask about user primitives: equal distances count.
@@ -161,11 +182,21 @@ impl<U: Copy> Best<U> {
 
     /// What user primitive `index` said.
     #[inline(always)]
-    fn offer_user_hit(&mut self, index: u32, hit: Option<(f32, U)>) {
+    fn offer_user_hit<L: Leaves<UserHit = U>>(&mut self, leaves: &L, index: u32, hit: Option<(f32, U)>) {
         if let Some((t, hit)) = hit
-            && self.is_beaten_by(t, Self::USERS + index)
+            && (t < self.t || (t == self.t && self.yields_to(leaves, index, &hit)))
         {
             (self.t, self.rank, self.user, self.found) = (t, Self::USERS + index, Some(hit), true);
+        }
+    }
+
+    /// Whether a hit of user primitive `index`, equally far away, counts instead.
+    #[cold]
+    fn yields_to<L: Leaves<UserHit = U>>(&self, leaves: &L, index: u32, hit: &U) -> bool {
+        match &self.user {
+            Some(mine) if self.rank >= Self::USERS => leaves.precedes((index, hit), (self.rank - Self::USERS, mine)),
+            // A triangle precedes, and so does the end of the ray, of rank 0.
+            _ => false,
         }
     }
 

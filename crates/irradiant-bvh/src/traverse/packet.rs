@@ -15,7 +15,7 @@ use super::{PADDING, WIDER};
 use crate::lanes::{Lanes, Native};
 use crate::node::{Block, Bvh, Child, Node, WIDTH};
 use crate::ray::{Closest, Leaves, Ray};
-use crate::triangle::{self, Candidate, Shear};
+use crate::triangle::{self, Shear};
 
 /// Rays in a packet.
 pub(crate) const PACKET: usize = 16;
@@ -35,6 +35,11 @@ struct Entry {
     child: Child,
     parent: u32,
     slot: u32,
+}
+
+impl Entry {
+    /// The parent of where the walk begins, whose box is not asked.
+    const NONE: u32 = u32::MAX;
 }
 
 /// One number of each ray.
@@ -237,6 +242,15 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         near.le(far).mask()
     }
 
+    /// Bit `i` says that ray `i` enters what waits before `t[i]`.
+    #[inline(always)]
+    fn active(&self, bvh: &Bvh, entry: &Entry, t: &Column) -> u32 {
+        if entry.parent == Entry::NONE {
+            return E::splat(0.0).lt(E::load(&t.0)).mask();
+        }
+        self.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, t)
+    }
+
     /// The shear of a ray.
     #[inline(always)]
     fn shear(&self, ray: usize) -> Shear {
@@ -265,26 +279,9 @@ impl<'a, E: Lanes<Array = [f32; PACKET]>, B: BoxTest> Packet<'a, E, B> {
         ];
         let (mut found, strange) = triangle::intersect_lanes(along, self.origin, self.shear, E::load(&t.0), active)?;
         if strange != 0 {
-            again_in_double(self.rays, &block.triangle(lane), t, strange, &mut found);
+            found = found.again_in_double(strange, |i| (block.triangle(lane), self.shear(i), t.0[i]));
         }
         Some(found)
-    }
-}
-
-#[cold]
-#[inline(never)]
-fn again_in_double<E: Lanes<Array = [f32; PACKET]>>(
-    rays: &[Ray],
-    vertices: &[[f32; 3]; 3],
-    t: &Column,
-    strange: u32,
-    found: &mut triangle::Candidates<E>,
-) {
-    for (i, ray) in rays.iter().take(PACKET).enumerate().filter(|(i, _)| strange >> i & 1 != 0) {
-        if let Some(hit) = triangle::intersect(vertices, &Shear::new(ray)).filter(|hit| hit.t <= t.0[i]) {
-            found.mask |= 1 << i;
-            (found.t[i], found.u[i], found.v[i]) = (hit.t, hit.u, hit.v);
-        }
     }
 }
 
@@ -321,6 +318,14 @@ struct Waiting {
 }
 
 impl Waiting {
+    /// Only where to begin.
+    #[inline(always)]
+    fn at(start: Child) -> Self {
+        let mut stack = Stack::new();
+        stack.set(0, Entry { near: 0.0, child: start, parent: Entry::NONE, slot: 0 });
+        Self { stack, n: 1 }
+    }
+
     /// All children of `node` in `mask`, farthest first.
     #[inline(always)]
     fn push(&mut self, bvh: &Bvh, node: u32, mask: u32, near: &[f32; WIDTH]) {
@@ -372,6 +377,7 @@ pub(super) fn gathered(mask: u32, ray: impl Fn(usize) -> Ray) -> ([Ray; PACKET],
 #[inline(always)]
 pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     leaves: &L,
     out: &mut [Option<Closest<L::UserHit>>],
@@ -382,14 +388,12 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     let Some((packet, t)) = Packet::<E, B>::new(rays) else { return false };
     let mut far = t.greatest();
     let mut best = Bests::new(t);
-    let mut waiting = Waiting { stack: Stack::new(), n: 0 };
-    let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
-    waiting.push(bvh, 0, mask, &near);
+    let mut waiting = Waiting::at(start);
     while let Some(entry) = waiting.pop() {
         if entry.near > far * PADDING {
             continue;
         }
-        let active = packet.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, &best.t);
+        let active = packet.active(bvh, &entry, &best.t);
         if active == 0 {
             continue;
         }
@@ -424,8 +428,9 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                         let mut one = best.get(i);
                         let found = triangle::intersect_block::<B::Eight>(block, &packet.shear(i), one.t);
                         let Some(found) = found else { return };
+                        let all = found.spread();
                         each(found.mask, |lane| {
-                            let at = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                            let at = all.at(lane);
                             one.offer_triangle(leaves, &rays[i], block.id(lane), at, || block.triangle(lane));
                         });
                         best.set(i, one);
@@ -448,6 +453,7 @@ pub(super) fn closest<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
 #[inline(always)]
 pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     bvh: &Bvh,
+    start: Child,
     rays: &[Ray],
     leaves: &L,
     out: &mut [bool],
@@ -458,12 +464,10 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
     // Rays that have met something end before they begin.
     let Some((packet, mut t)) = Packet::<E, B>::new(rays) else { return false };
     let mut far = t.greatest();
-    let mut waiting = Waiting { stack: Stack::new(), n: 0 };
+    let mut waiting = Waiting::at(start);
     out.fill(false);
-    let (mask, near) = packet.may_enter(&bvh.nodes[0], far);
-    waiting.push(bvh, 0, mask, &near);
     while let Some(entry) = waiting.pop() {
-        let active = packet.enter(&bvh.nodes[entry.parent as usize], entry.slot as usize, &t);
+        let active = packet.active(bvh, &entry, &t);
         if active == 0 {
             continue;
         }
@@ -498,8 +502,9 @@ pub(super) fn any<E: Lanes<Array = [f32; PACKET]>, B: BoxTest, L: Leaves>(
                     each(active, |i| {
                         let found = triangle::intersect_block::<B::Eight>(block, &packet.shear(i), t.0[i]);
                         let Some(found) = found else { return };
+                        let all = found.spread();
                         each(found.mask, |lane| {
-                            let at = Candidate { t: found.t[lane], u: found.u[lane], v: found.v[lane] };
+                            let at = all.at(lane);
                             blocked |= u32::from(counts(leaves, &rays[i], block, lane, at)) << i;
                         });
                     });

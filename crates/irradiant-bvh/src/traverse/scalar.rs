@@ -93,13 +93,13 @@ fn entered(node: &Node, ray: &Ray, far: f32) -> impl Iterator<Item = (f32, Child
     list.into_iter().take(n)
 }
 
-pub(super) fn closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
+pub(super) fn closest<L: Leaves>(bvh: &Bvh, start: Child, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
     if bvh.nodes.is_empty() || !is_proper(ray) {
         return None;
     }
     let shear = Shear::new(ray);
     let mut best = Best::new(ray.t_max);
-    let mut stack = [(0.0, Child(0)); crate::node::STACK];
+    let mut stack = [(0.0, start); crate::node::STACK];
     let mut n = 1;
     while n > 0 {
         n -= 1;
@@ -140,12 +140,12 @@ pub(super) fn closest<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> Option<Clo
     best.finish()
 }
 
-pub(super) fn any<L: Leaves>(bvh: &Bvh, ray: &Ray, leaves: &L) -> bool {
+pub(super) fn any<L: Leaves>(bvh: &Bvh, start: Child, ray: &Ray, leaves: &L) -> bool {
     if bvh.nodes.is_empty() || !is_proper(ray) {
         return false;
     }
     let shear = Shear::new(ray);
-    let mut stack = [Child(0); crate::node::STACK];
+    let mut stack = [start; crate::node::STACK];
     let mut n = 1;
     while n > 0 {
         n -= 1;

@@ -6,7 +6,7 @@ use super::{Best, PADDING};
 use crate::lanes::Lanes;
 use crate::node::{Block, Bvh, Child, LAST_USER};
 use crate::ray::{Closest, Leaves, Ray};
-use crate::triangle::{Candidate, Candidates};
+use crate::triangle::Candidates;
 
 /// Origins and reciprocal directions of proper rays that move along every axis.
 #[derive(Clone, Copy)]
@@ -47,13 +47,13 @@ impl<E: Lanes<Array = [f32; PACKET]>> Lines<E> {
     ) -> u32 {
         if L::HAS_FILTER && block.id(lane) & Block::FILTERED != 0 {
             let mut stopped = 0;
+            let all = found.spread();
             each(found.mask, |i| {
-                let at = Candidate { t: found.t[i], u: found.u[i], v: found.v[i] };
-                stopped |= u32::from(counts(leaves, &ray(i), block, lane, at)) << i;
+                stopped |= u32::from(counts(leaves, &ray(i), block, lane, all.at(i))) << i;
             });
             return stopped;
         }
-        let (t, inside) = self.within_own_box(&block.triangle(lane), E::load(&found.t));
+        let (t, inside) = self.within_own_box(&block.triangle(lane), found.t);
         found.mask & inside & t.lt(ends).mask()
     }
 }
@@ -104,16 +104,16 @@ impl<U: Copy> Bests<U> {
     ) {
         let id = block.id(lane);
         let index = id & Block::INDEX;
-        let (t, inside) = lines.within_own_box(&block.triangle(lane), E::load(&found.t));
+        let (t, inside) = lines.within_own_box(&block.triangle(lane), found.t);
         let best = E::load(&self.t.0);
         let candidates = found.mask & inside;
         let mut nearer = candidates & t.lt(best).mask();
         let equal = candidates & t.le(best).mask() & !nearer;
         each(equal, |i| nearer |= u32::from(index < self.rank[i]) << i);
         if L::HAS_FILTER && id & Block::FILTERED != 0 {
-            let t = t.to_array();
+            let (t, all) = (t.to_array(), found.spread());
             each(nearer, |i| {
-                if !leaves.accept(index, &ray(i), t[i], found.u[i], found.v[i]) {
+                if !leaves.accept(index, &ray(i), t[i], all.at(i).u, all.at(i).v) {
                     nearer &= !(1 << i);
                 }
             });
@@ -122,8 +122,8 @@ impl<U: Copy> Bests<U> {
             return;
         }
         self.t = Column(E::select(nearer, t, best).to_array());
-        self.u = Column(E::select(nearer, E::load(&found.u), E::load(&self.u.0)).to_array());
-        self.v = Column(E::select(nearer, E::load(&found.v), E::load(&self.v.0)).to_array());
+        self.u = Column(E::select(nearer, found.u, E::load(&self.u.0)).to_array());
+        self.v = Column(E::select(nearer, found.v, E::load(&self.v.0)).to_array());
         each(nearer, |i| self.rank[i] = index);
         self.found |= nearer;
     }
@@ -145,7 +145,7 @@ impl<U: Copy> Bests<U> {
             leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
             for (&i, hit) in which[..n].iter().zip(hits) {
                 let mut one = self.get(i);
-                one.offer_user_hit(user & !LAST_USER, hit);
+                one.offer_user_hit(leaves, user & !LAST_USER, hit);
                 self.set(i, one);
             }
             if user & LAST_USER != 0 {
@@ -173,6 +173,9 @@ pub(super) fn stopped_by_users<L: Leaves>(
     let mut stopped = 0;
     for index in leaf.index().. {
         let user = bvh.users[index];
+        if active & !stopped == 0 {
+            break;
+        }
         let (rays, which, n) = gathered(active & !stopped, &ray);
         let mut met = [false; PACKET];
         leaves.occluded_many(user & !LAST_USER, &rays[..n], &mut met[..n]);

@@ -41,12 +41,32 @@ pub(crate) const NO_EMITTER: u32 = u32::MAX;
 /// A primitive that the tree knows only by its box. Indices into the vectors of [`Geometry`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum User {
-    Sphere { shape: u32, sphere: u32 },
-    Disk { shape: u32, disk: u32 },
-    Cylinder { shape: u32, cylinder: u32 },
-    Patch { mesh: u32, quad: u32 },
-    Curve { shape: u32, curve: u32, piece: u32 },
-    Instance(u32),
+    Sphere {
+        shape: u32,
+        sphere: u32,
+    },
+    Disk {
+        shape: u32,
+        disk: u32,
+    },
+    Cylinder {
+        shape: u32,
+        cylinder: u32,
+    },
+    Patch {
+        mesh: u32,
+        quad: u32,
+    },
+    Curve {
+        shape: u32,
+        curve: u32,
+        piece: u32,
+    },
+    /// An instance, or a part of it; the parts of one follow each other.
+    Instance {
+        instance: u32,
+        part: bvh::Part,
+    },
 }
 
 /// Consecutive triangles of a tree that belong to one mesh.
@@ -126,6 +146,20 @@ impl Group {
         let range = self.ranges.of(primitive);
         (range.mesh, primitive - range.first)
     }
+
+    /// How many primitives there are that are not triangles: each instance is one, whatever its parts.
+    pub fn n_users(&self) -> usize {
+        (0..self.users.len()).filter(|&i| self.begins(i)).count()
+    }
+
+    /// Whether user primitive `i` is the first, or only, part of what it is.
+    pub fn begins(&self, i: usize) -> bool {
+        let instance = |i: usize| match self.users[i] {
+            User::Instance { instance, .. } => Some(instance),
+            _ => None,
+        };
+        i == 0 || instance(i).is_none() || instance(i) != instance(i - 1)
+    }
 }
 
 /// The shapes themselves.
@@ -182,18 +216,24 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
 
     fn occluded(&self, user: u32, ray: &bvh::Ray) -> bool {
         match self.group.users[user as usize] {
-            User::Instance(i) => {
+            User::Instance { instance: i, part } => {
                 let instance = &self.geometry.shapes.instances[i as usize];
                 let local = instance.ray_to_group(ray);
                 let group = &self.geometry.groups[instance.group as usize];
-                group.tree.occluded(self.geometry.level, &local, &GroupLeaves { group, ..*self })
+                group.tree.occluded_part(part, self.geometry.level, &local, &GroupLeaves { group, ..*self })
             }
             _ => self.meet(user, ray).is_some(),
         }
     }
 
+    fn precedes(&self, (a, hit): (u32, &Hit), (b, other): (u32, &Hit)) -> bool {
+        // Parts of one instance hold triangles only.
+        let same = hit.instances[0] != NO_INSTANCE && hit.instances == other.instances;
+        if same { hit.primitive < other.primitive } else { a < b }
+    }
+
     fn intersect_many(&self, user: u32, rays: &[bvh::Ray], hits: &mut [Option<(f32, Hit)>]) {
-        let User::Instance(i) = self.group.users[user as usize] else {
+        let User::Instance { instance: i, part } = self.group.users[user as usize] else {
             for (ray, hit) in rays.iter().zip(hits) {
                 *hit = self.meet(user, ray);
             }
@@ -204,7 +244,8 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
         let leaves = GroupLeaves { group, ..*self };
         for (rays, hits) in rays.chunks(MANY).zip(hits.chunks_mut(MANY)) {
             let (local, mut found) = (rays_to_group(instance, rays), [None; MANY]);
-            group.tree.intersect_batch(self.geometry.level, &local[..rays.len()], &leaves, &mut found[..rays.len()]);
+            let (local, found_of) = (&local[..rays.len()], &mut found[..rays.len()]);
+            group.tree.intersect_part_batch(part, self.geometry.level, local, &leaves, found_of);
             for (hit, found) in hits.iter_mut().zip(found) {
                 *hit = found.map(|closest| {
                     let mut inner = super::hit_of(closest);
@@ -216,7 +257,7 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
     }
 
     fn occluded_many(&self, user: u32, rays: &[bvh::Ray], out: &mut [bool]) {
-        let User::Instance(i) = self.group.users[user as usize] else {
+        let User::Instance { instance: i, part } = self.group.users[user as usize] else {
             for (ray, out) in rays.iter().zip(out) {
                 *out = self.meet(user, ray).is_some();
             }
@@ -227,7 +268,7 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
         let leaves = GroupLeaves { group, ..*self };
         for (rays, out) in rays.chunks(MANY).zip(out.chunks_mut(MANY)) {
             let local = rays_to_group(instance, rays);
-            group.tree.occluded_batch(self.geometry.level, &local[..rays.len()], &leaves, out);
+            group.tree.occluded_part_batch(part, self.geometry.level, &local[..rays.len()], &leaves, out);
         }
     }
 
@@ -343,11 +384,13 @@ impl<A: AlphaTextures> GroupLeaves<'_, A> {
                     self.is_there(shape, &single, false, || context(single.at(t), -single.d, Point2::new(u, v), 0));
                 there.then(|| (t, hit(t, u, v)))
             }
-            User::Instance(i) => {
+            User::Instance { instance: i, part } => {
                 let instance = &shapes.instances[i as usize];
                 let local = instance.ray_to_group(ray);
                 let group = &self.geometry.groups[instance.group as usize];
-                let mut found = self.geometry.closest(group, &local, &GroupLeaves { group, ..*self })?;
+                let leaves = GroupLeaves { group, ..*self };
+                let mut found =
+                    group.tree.intersect_part(part, self.geometry.level, &local, &leaves).map(super::hit_of)?;
                 found.instances = [i, found.instances[0]];
                 Some((found.t, found))
             }

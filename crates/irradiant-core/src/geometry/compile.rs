@@ -397,7 +397,7 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
         let bounds = motion.bounds(&Bounds3 { min: min.into(), max: max.into() });
         let index = self.shapes.instances.len() as u32;
         self.shapes.instances.push(Instance { group, motion });
-        members.add(User::Instance(index), bounds);
+        members.add(User::Instance { instance: index, part: bvh::Part::ALL }, bounds);
     }
 
     /// Builds the tree of an object or moving shape; `None` when nothing in it can be met.
@@ -410,7 +410,34 @@ impl<F: Fn(MaterialRef) -> MaterialId> Compiler<'_, F> {
         Some(self.groups.len() as u32 - 1)
     }
 
+    /// Instances that hold many others become their parts.
+    fn braided(&self, members: Members) -> Members {
+        let instance = |i: usize| match members.users[i] {
+            User::Instance { instance, .. } => Some((instance, &self.shapes.instances[instance as usize])),
+            _ => None,
+        };
+        let tree_of = |i: usize| match instance(i)? {
+            (_, Instance { group, motion: Motion::Still(_) }) => {
+                self.groups[*group as usize].as_ref().filter(|g| g.users.is_empty()).map(|g| &g.tree)
+            }
+            _ => None,
+        };
+        let outside = |i: usize, [min, max]: &[[f32; 3]; 2]| {
+            let inside = Bounds3 { min: (*min).into(), max: (*max).into() };
+            let bounds = instance(i).map_or(inside, |(_, placed)| placed.motion.bounds(&inside));
+            [bounds.min.to_array(), bounds.max.to_array()]
+        };
+        let braids = bvh::braid(&members.boxes, tree_of, outside);
+        let user = |b: &bvh::Braid| match instance(b.instance as usize) {
+            Some((instance, _)) => User::Instance { instance, part: b.part },
+            None => members.users[b.instance as usize],
+        };
+        let (users, boxes) = (braids.iter().map(user).collect(), braids.iter().map(|b| b.bounds).collect());
+        Members { meshes: members.meshes, users, boxes }
+    }
+
     fn group(&mut self, members: Members) -> Group {
+        let members = self.braided(members);
         let mut first = 0;
         let mut ranges = Vec::with_capacity(members.meshes.len());
         let mut meshes = Vec::with_capacity(members.meshes.len());

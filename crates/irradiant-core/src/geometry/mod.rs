@@ -142,7 +142,8 @@ impl Geometry {
     #[inline]
     pub fn intersect(&self, ray: &Ray, t_max: f32, alpha: &impl AlphaTextures) -> Option<Hit> {
         let group = &self.groups[0];
-        self.closest(group, &to_tree(ray, t_max), &GroupLeaves { geometry: self, group, alpha })
+        let leaves = GroupLeaves { geometry: self, group, alpha };
+        group.tree.intersect(self.level, &to_tree(ray, t_max), &leaves).map(hit_of)
     }
 
     /// Whether any surface lies at 0 < t < `t_max`.
@@ -248,15 +249,6 @@ impl Geometry {
         }
     }
 
-    pub(crate) fn closest<A: AlphaTextures>(
-        &self,
-        group: &Group,
-        ray: &bvh::Ray,
-        leaves: &GroupLeaves<A>,
-    ) -> Option<Hit> {
-        group.tree.intersect(self.level, ray, leaves).map(hit_of)
-    }
-
     /// What the ray met at `hit` (which [`Geometry::intersect`] gave for this very ray).
     #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
@@ -316,7 +308,7 @@ impl Geometry {
                     shapes.curves[curve as usize].interaction(piece, &single, &met, at);
                     (shape, piece)
                 }
-                User::Instance(_) => return,
+                User::Instance { .. } => return,
             }
         } else {
             let (mesh, triangle) = group.triangle(hit.primitive);
@@ -374,7 +366,7 @@ impl Geometry {
     /// Number of triangles, and of other primitives, over all groups.
     pub fn n_primitives(&self) -> (usize, usize) {
         let triangles = self.shapes.meshes.iter().map(|m| m.triangles.len()).sum();
-        (triangles, self.groups.iter().map(|g| g.users.len()).sum())
+        (triangles, self.groups.iter().map(Group::n_users).sum())
     }
 
     /// Bytes held by vertices, faces, trees and emitters.

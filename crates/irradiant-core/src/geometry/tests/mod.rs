@@ -1,6 +1,7 @@
 //! What all tests of geometry share: scenes in a few words.
 
 mod batch;
+mod braids;
 mod emitters;
 mod hits;
 mod robust;

@@ -209,7 +209,7 @@ fn quadric<T: Number>(geometry: &Geometry, user: &User, o: Triple<T>, d: Triple<
             let kept = roots.map(|t| c.point(o.map(T::wide), d.map(T::wide), t.wide()).is_some());
             Some((roots, kept))
         }
-        User::Disk { .. } | User::Patch { .. } | User::Curve { .. } | User::Instance(_) => None,
+        User::Disk { .. } | User::Patch { .. } | User::Curve { .. } | User::Instance { .. } => None,
     }
 }
 
@@ -270,7 +270,8 @@ fn gather<T: Number>(geometry: &Geometry, group: u32, through: Option<u32>, foun
             User::Cylinder { shape, cylinder } if opaque(shape) => {
                 add(Form::Quadric(*user), shapes.cylinders[cylinder as usize].bounds());
             }
-            User::Instance(instance) => {
+            User::Instance { .. } if !group.begins(i) => {}
+            User::Instance { instance, .. } => {
                 let placed = &shapes.instances[instance as usize];
                 let inner = &geometry.groups[placed.group as usize];
                 let still = matches!(placed.motion, Motion::Still(_));
