@@ -32,7 +32,7 @@ type Box3 = [[f32; 3]; 2];
 /// meet it.
 const LARGE: f32 = 1.0 / 64.0;
 const COMPANY: usize = 16;
-/// Large instances that are looked at, and parts of each, at most: the work is linear in the number of boxes.
+/// Large instances that are looked at, and parts of each, at most: of so many parts each is compared with all boxes once.
 const LOOKED_AT: usize = 256;
 const PARTS: usize = 64;
 

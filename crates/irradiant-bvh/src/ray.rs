@@ -83,7 +83,7 @@ pub trait Leaves {
     /// The first hit of user primitive `user` with `0 < t < ray.t_max`.
     ///
     /// `ray.t_max` is one step above the closest `t` so far, so that equal distances are reported and the tie can be
-    /// broken by index.
+    /// broken by [`precedes`](Self::precedes).
     fn intersect(&self, user: u32, ray: &Ray) -> Option<(f32, Self::UserHit)>;
 
     /// Whether user primitive `user` has any hit with `0 < t < ray.t_max`.

@@ -46,7 +46,7 @@ pub struct BuildSettings {
 
 impl Default for BuildSettings {
     fn default() -> Self {
-        Self { node_cost: 1.0, block_cost: 0.15, user_cost: 2.0, max_leaf_blocks: 4 }
+        Self { node_cost: 1.0, block_cost: 0.3, user_cost: 2.0, max_leaf_blocks: 4 }
     }
 }
 

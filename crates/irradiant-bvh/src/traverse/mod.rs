@@ -56,7 +56,8 @@ pub(crate) const WIDER: f32 = 1.000_001_9;
 impl Bvh {
     /// The closest hit of `ray`, or `None`.
     ///
-    /// Of several at exactly the same `t`, triangles come before user primitives, and lower indices before higher.
+    /// Of several at exactly the same `t`, triangles come before user primitives, lower indices before higher, and among user primitives those
+    /// that [`Leaves::precedes`] puts first.
     #[inline]
     pub fn intersect<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
         self.intersect_part(Part::ALL, level, ray, leaves)

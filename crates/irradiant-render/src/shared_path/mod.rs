@@ -14,7 +14,7 @@
 //! takes part as soon as the camera sees it, also when its own path draws no direction; and no path ends because it is of no use to its own pixel.
 //!
 //! What is shared: second vertices on diffuse surfaces, leaves and rough metals, for first vertices on the same; and, for these too, the sky, if it is the only
-//! environment ([`sky`]). All else (direct light of lamps at the first vertex, lamps that the path meets, other materials) is each pixel's own, as
+//! environment and has no portal ([`sky`]). All else (direct light of lamps at the first vertex, lamps that the path meets, other materials) is each pixel's own, as
 //! in [`path`](crate::path).
 //!
 //! Errors of the pixels of a block go together: a picture has less noise per pixel but what is left is blotchy, and the mean over
@@ -56,8 +56,8 @@ pub(crate) const PIXELS: usize = (SIDE * SIDE) as usize;
 /// By name.
 pub const ENTRY: IntegratorEntry = IntegratorEntry {
     name: "sharedpath",
-    promise: "path tracing whose indirect light is shared among the pixels of a block",
-    source: "Bekaert, Sbert and Halton 2002",
+    promise: "path tracing whose indirect light, and that of the sky, is shared among the pixels of a block",
+    source: "Bekaert, Sbert and Halton 2002; of the sky by systematic sampling, Madow 1949",
     options: &[lights_option(8), SKY, LIGHT_SAMPLER],
     make: |options, max_depth| {
         let (light_splits, sky_tests) = (options.count("lights"), options.count("sky"));

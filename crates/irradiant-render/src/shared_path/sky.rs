@@ -8,7 +8,7 @@
 //! A pixel knows V for its own two. Of the others it tests but some, drawn without bias in proportion to what they would bring if it saw what their
 //! finders saw (with [`UNSEEN`] instead of 0, for it may see more): of a chance c a contribution is divided by c. Chances go up to 1, and are taken along one line by one
 //! random number (systematic sampling: Madow 1949; proportional to size: Hartley and Rao 1962). What one pixel has found out by rays so spares
-//! its neighbours theirs, as in spatial resampling (Bitterli et al. 2020), without bias and without weights that can grow without bound.
+//! its neighbours theirs, as in spatial resampling (Bitterli et al. 2020), without bias, and with weights that are bounded ([`LEAST_SHARE`]).
 
 use super::{PIXELS, Scratch};
 use crate::integrator::RenderStats;
@@ -115,6 +115,10 @@ fn chances_per_weight(weights: &[f32], tests: f32) -> f32 {
     scale
 }
 
+/// What a direction of which anything is expected counts for at least, as a share of all: what finders saw may mislead, and what is tested seldom counts much when it
+/// is. Of thirty directions at most an eighth of the tests goes there.
+pub(super) const LEAST_SHARE: f32 = 0.004;
+
 /// Rounds in which chances above 1 are cut and what is left is spread over the others.
 pub(super) const ROUNDS: usize = 3;
 
@@ -148,7 +152,8 @@ pub(super) fn share_sky(scene: &Scene, sky: &SharedSky, scratch: &mut Scratch, s
             let Some(first) = &member.first else { continue };
             let (f, pdf) = first.bsdf.f_and_pdf(first.at.wo, wi, TransportMode::Radiance);
             let f_cos = f * first.bsdf.abs_cos(wi);
-            if !(pdf > 0.0) || !pdf.is_finite() || f_cos.is_black() {
+            // Light samples find what is too rare for the BSDF to draw (pdf 0), too.
+            if f_cos.is_black() || !pdf.is_finite() {
                 continue;
             }
             (scattered[j][i], pdfs[i]) = (f_cos, pdf);
@@ -169,6 +174,8 @@ pub(super) fn share_sky(scene: &Scene, sky: &SharedSky, scratch: &mut Scratch, s
         for j in (0..GLIMPSES).filter(|j| j % PIXELS != i) {
             weights[j] = scattered[j][i].max_component() * expected[j];
         }
+        let least = LEAST_SHARE * weights.iter().sum::<f32>();
+        weights.iter_mut().filter(|weight| **weight > 0.0).for_each(|weight| *weight = weight.max(least));
         let scale = chances_per_weight(&weights, sky.tests as f32);
         // Roulette has no use for this number here.
         let mut mark = member.sample.stream.scatter(0).roulette;

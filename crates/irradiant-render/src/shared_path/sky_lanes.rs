@@ -2,7 +2,7 @@
 
 use super::PIXELS;
 use super::blocks::{Blocks, Model, Receivers, Sixteen, Spectra, Three, set_spectrum, spectrum};
-use super::sky::{GLIMPSES, Glimpse, ROUNDS, SharedSky};
+use super::sky::{GLIMPSES, Glimpse, LEAST_SHARE, ROUNDS, SharedSky};
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use irradiant_core::bxdf::TransportMode;
@@ -96,7 +96,7 @@ impl Kernel for Choose<'_> {
     fn run(self) {
         let Self { outlooks, marks, tests } = self;
         let mut weights = [[0.0; PIXELS]; GLIMPSES];
-        let mut positive = [0.0; PIXELS];
+        let (mut positive, mut total) = ([0.0; PIXELS], [0.0; PIXELS]);
         for (outlook, weights) in outlooks.iter().zip(&mut weights) {
             for i in 0..PIXELS {
                 let [a, b, c, d] = &outlook.f_cos;
@@ -104,6 +104,13 @@ impl Kernel for Choose<'_> {
                 let counts = (i != outlook.finder) & (outlook.scatters[i] != 0);
                 weights[i] = if counts { most * outlook.expected } else { 0.0 };
                 positive[i] += if weights[i] > 0.0 { 1.0 } else { 0.0 };
+                total[i] += weights[i];
+            }
+        }
+        for weights in &mut weights[..outlooks.len()] {
+            for i in 0..PIXELS {
+                let least = LEAST_SHARE * total[i];
+                weights[i] = if weights[i] > 0.0 { weights[i].max(least) } else { 0.0 };
             }
         }
         let mut scale = [0.0; PIXELS];
@@ -211,7 +218,7 @@ impl Outlooks {
                     let (bsdf, wo) = &blocks.alone[k as usize];
                     let (f, pdf) = bsdf.f_and_pdf(*wo, wi, TransportMode::Radiance);
                     let f_cos = f * bsdf.abs_cos(wi);
-                    let scatters = pdf > 0.0 && pdf.is_finite() && !f_cos.is_black();
+                    let scatters = pdf.is_finite() && !f_cos.is_black();
                     set_spectrum(&mut out.f_cos, i, f_cos);
                     (out.pdf[i], out.scatters[i]) = if scatters { (pdf, 1) } else { (0.0, 0) };
                 }
