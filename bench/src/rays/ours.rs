@@ -54,7 +54,7 @@ impl Instances<'_> {
     }
 
     /// The ray in the space of an instance: distances along it stay the same.
-    #[inline]
+    #[inline(always)]
     fn inside(&self, user: u32, ray: &Ray) -> (&Bvh, Part, Ray) {
         let p = &self.placed[user as usize];
         let (o, d) = (scale(sub(ray.o, p.origin), p.shrink), scale(ray.d, p.shrink));
@@ -65,6 +65,7 @@ impl Instances<'_> {
 impl Leaves for Instances<'_> {
     type UserHit = Hit;
 
+    #[inline(always)]
     fn intersect(&self, user: u32, ray: &Ray) -> Option<(f32, Hit)> {
         let (tree, part, ray) = self.inside(user, ray);
         match tree.intersect_part(part, self.level, &ray, &TrianglesOnly)? {
@@ -73,6 +74,7 @@ impl Leaves for Instances<'_> {
         }
     }
 
+    #[inline(always)]
     fn occluded(&self, user: u32, ray: &Ray) -> bool {
         let (tree, part, ray) = self.inside(user, ray);
         tree.occluded_part(part, self.level, &ray, &TrianglesOnly)

@@ -9,7 +9,7 @@
 //! A hit must be farther than the error bound of its own `t` (Pharr et al. 2023, section 6.8.4), so a ray leaving a
 //! surface does not meet it again because of rounding alone. We take differences of plain products where they fuse.
 
-use crate::lanes::{Eight, Lanes};
+use crate::lanes::{Eight, Lanes, Native};
 use crate::node::Block;
 use crate::ray::Ray;
 
@@ -58,17 +58,19 @@ impl Shear {
     pub fn new(ray: &Ray) -> Self {
         // Written out for each order of axes, so that no index is looked up and no function is called.
         let (o, d) = (&ray.o, &ray.d);
+        // The division that box tests do too.
+        let [x, y, z, _] = (Native::splat(1.0) / ray.lanes::<Native>().1).to_array();
         match Self::axes(ray) {
-            axes @ [1, 2, 0] => Self::along(axes, [o[1], o[2], o[0]], [d[1], d[2], d[0]]),
-            axes @ [2, 0, 1] => Self::along(axes, [o[2], o[0], o[1]], [d[2], d[0], d[1]]),
-            axes => Self::along(axes, *o, *d),
+            axes @ [1, 2, 0] => Self::along(axes, [o[1], o[2], o[0]], [d[1], d[2], d[0]], x),
+            axes @ [2, 0, 1] => Self::along(axes, [o[2], o[0], o[1]], [d[2], d[0], d[1]], y),
+            axes => Self::along(axes, *o, *d, z),
         }
     }
 
-    /// From an origin and a direction along these axes.
+    /// From an origin and a direction along these axes, and the reciprocal of the last.
     #[inline(always)]
-    fn along(axes: [usize; 3], origin: [f32; 3], [dx, dy, dz]: [f32; 3]) -> Self {
-        Self { axes, origin, shear: [-dx / dz, -dy / dz, 1.0 / dz] }
+    fn along(axes: [usize; 3], origin: [f32; 3], [dx, dy, dz]: [f32; 3], scale: f32) -> Self {
+        Self { axes, origin, shear: [-dx / dz, -dy / dz, scale] }
     }
 }
 

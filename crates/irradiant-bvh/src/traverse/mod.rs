@@ -43,7 +43,7 @@ mod tests;
 
 use crate::lanes::{Lanes, Native};
 use crate::level::Level;
-use crate::node::Bvh;
+use crate::node::{Bvh, Child};
 use crate::part::Part;
 use crate::ray::{Closest, Leaves, Ray};
 use crate::triangle::Candidate;
@@ -58,13 +58,13 @@ impl Bvh {
     ///
     /// Of several at exactly the same `t`, triangles come before user primitives, lower indices before higher, and among user primitives those
     /// that [`Leaves::precedes`] puts first.
-    #[inline]
+    #[inline(always)]
     pub fn intersect<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> Option<Closest<L::UserHit>> {
         self.intersect_part(Part::ALL, level, ray, leaves)
     }
 
     /// The same of a part of the tree.
-    #[inline]
+    #[inline(always)]
     pub fn intersect_part<L: Leaves>(
         &self,
         Part(start): Part,
@@ -73,43 +73,57 @@ impl Bvh {
         leaves: &L,
     ) -> Option<Closest<L::UserHit>> {
         match level.min(Level::detect()) {
-            Level::Scalar => scalar::closest(self, start, ray, leaves),
-            Level::Neon => walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
-            #[cfg(target_arch = "x86_64")]
-            Level::Sse => walk::closest::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::closest_avx2(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => boxes::x86::closest_avx512(self, start, ray, leaves),
-            #[cfg(not(target_arch = "x86_64"))]
-            Level::Sse | Level::Avx2 | Level::Avx512 => {
-                walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves)
-            }
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => boxes::x86::closest_avx2(self, start, ray, leaves),
+            level => self.closest_at_lower(start, level, ray, leaves),
+        }
+    }
+
+    /// Out of the way of those that are to be inlined where instances ask.
+    #[inline(never)]
+    fn closest_at_lower<L: Leaves>(
+        &self,
+        start: Child,
+        level: Level,
+        ray: &Ray,
+        leaves: &L,
+    ) -> Option<Closest<L::UserHit>> {
+        match level {
+            Level::Scalar => scalar::closest(self, start, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => walk::closest::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
+            _ => walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
         }
     }
 
     /// Whether `ray` meets anything.
-    #[inline]
+    #[inline(always)]
     pub fn occluded<L: Leaves>(&self, level: Level, ray: &Ray, leaves: &L) -> bool {
         self.occluded_part(Part::ALL, level, ray, leaves)
     }
 
     /// Whether `ray` meets anything in a part of the tree.
-    #[inline]
+    #[inline(always)]
     pub fn occluded_part<L: Leaves>(&self, Part(start): Part, level: Level, ray: &Ray, leaves: &L) -> bool {
         match level.min(Level::detect()) {
-            Level::Scalar => scalar::any(self, start, ray, leaves),
-            Level::Neon => walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
-            #[cfg(target_arch = "x86_64")]
-            Level::Sse => walk::any::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => boxes::x86::any_avx2(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => boxes::x86::any_avx512(self, start, ray, leaves),
-            #[cfg(not(target_arch = "x86_64"))]
-            Level::Sse | Level::Avx2 | Level::Avx512 => {
-                walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves)
-            }
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => boxes::x86::any_avx2(self, start, ray, leaves),
+            level => self.any_at_lower(start, level, ray, leaves),
+        }
+    }
+
+    /// As [`Self::closest_at_lower`].
+    #[inline(never)]
+    fn any_at_lower<L: Leaves>(&self, start: Child, level: Level, ray: &Ray, leaves: &L) -> bool {
+        match level {
+            Level::Scalar => scalar::any(self, start, ray, leaves),
+            #[cfg(target_arch = "x86_64")]
+            Level::Sse => walk::any::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
+            _ => walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
         }
     }
 }
