@@ -264,6 +264,37 @@ impl Geometry {
         self.fill(0, &to_tree(ray, f32::INFINITY), hit, hit.instances, at);
     }
 
+    /// The same, but that neither parameters nor derivatives other than the first need be told where `is_plain` says so of a material and a
+    /// light: those of spheres are not.
+    pub fn fill_in_plainly(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        at: &mut Interaction,
+        is_plain: impl FnOnce(MaterialId, Option<LightId>) -> bool,
+    ) {
+        if !hit.is_user || hit.instances[0] != NO_INSTANCE {
+            return self.fill_in(ray, hit, at);
+        }
+        let User::Sphere { shape, sphere } = self.groups[0].users[hit.primitive as usize] else {
+            return self.fill_in(ray, hit, at);
+        };
+        let info = &self.shapes.infos[shape as usize];
+        let light = match info.first_emitter {
+            NO_EMITTER => None,
+            emitter => self.lights[emitter as usize],
+        };
+        if !is_plain(info.material, light) {
+            return self.fill_in(ray, hit, at);
+        }
+        // The root was there when the ray met it.
+        if let Some(placed) = self.shapes.spheres[sphere as usize].place(ray, hit.u as usize) {
+            (at.p, at.p_error, at.n, at.ns) = (placed.p, placed.p_error, placed.n, placed.n);
+            (at.dpdu, at.dpdus) = (placed.dpdu, placed.dpdu);
+        }
+        (at.material, at.shape, at.light) = (info.material, ShapeId(shape), light);
+    }
+
     /// Fills in a hit in the space of a group.
     fn fill(&self, group: u32, ray: &bvh::Ray, hit: &Hit, instances: [u32; 2], at: &mut Interaction) {
         if instances[0] != NO_INSTANCE {
