@@ -10,7 +10,7 @@ use super::disk::Disk;
 use super::instance::Instance;
 use super::sphere::Sphere;
 use super::triangle::Mesh;
-use super::{AlphaTextures, Geometry, Hit, NO_INSTANCE, bilinear};
+use super::{AlphaTextures, Geometry, Hit, HitOf, NO_INSTANCE, bilinear};
 use crate::interaction::{MaterialId, TextureContext};
 use irradiant_bvh as bvh;
 use irradiant_math::{Point2, Point3, Ray, Vec3, hash};
@@ -333,7 +333,7 @@ impl bvh::Kernel for NearSphere<'_> {
 }
 
 fn hit_of_user(user: u32, t: f32, u: f32, v: f32) -> Hit {
-    Hit { t, u, v, primitive: user, is_user: true, instances: [NO_INSTANCE; 2] }
+    Hit { t, u, v, primitive: user, of: HitOf::User, instances: [NO_INSTANCE; 2] }
 }
 
 /// Whether a root counts with 0 < t < t_max, first as a double, then as the single that is reported.

@@ -77,16 +77,25 @@ pub struct Hit {
     pub(crate) v: f32,
     /// Index in its tree.
     pub(crate) primitive: u32,
-    /// Not a triangle.
-    pub(crate) is_user: bool,
+    /// What kind of primitive.
+    pub(crate) of: HitOf,
     /// Instances from outside in.
     pub(crate) instances: [u32; 2],
+}
+
+/// What kind of primitive is hit. As large as the numbers beside it: hits with a byte in them are copied in pieces that overlap, which wait for
+/// each other in the processor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum HitOf {
+    Triangle,
+    User,
 }
 
 fn hit_of(closest: bvh::Closest<Hit>) -> Hit {
     match closest {
         bvh::Closest::Triangle(bvh::Hit { t, u, v, primitive }) => {
-            Hit { t, u, v, primitive, is_user: false, instances: [NO_INSTANCE; 2] }
+            Hit { t, u, v, primitive, of: HitOf::Triangle, instances: [NO_INSTANCE; 2] }
         }
         bvh::Closest::User { hit, .. } => hit,
     }
@@ -273,7 +282,7 @@ impl Geometry {
         at: &mut Interaction,
         is_plain: impl FnOnce(MaterialId, Option<LightId>) -> bool,
     ) {
-        if !hit.is_user || hit.instances[0] != NO_INSTANCE {
+        if hit.of == HitOf::Triangle || hit.instances[0] != NO_INSTANCE {
             return self.fill_in(ray, hit, at);
         }
         let User::Sphere { shape, sphere } = self.groups[0].users[hit.primitive as usize] else {
@@ -306,7 +315,7 @@ impl Geometry {
         }
         let group = &self.groups[group as usize];
         let shapes = &self.shapes;
-        let (shape, emitter) = if hit.is_user {
+        let (shape, emitter) = if hit.of == HitOf::User {
             let single = accel::to_ray(ray);
             let mut quadric = |placed: Option<placement::Placed>| {
                 // The roots were there when the ray met them, and this is the same computation.
