@@ -10,7 +10,7 @@ use super::disk::Disk;
 use super::instance::Instance;
 use super::sphere::Sphere;
 use super::triangle::Mesh;
-use super::{AlphaTextures, Geometry, Hit, NO_INSTANCE, bilinear};
+use super::{AlphaTextures, Geometry, Hit, HitOf, NO_INSTANCE, bilinear};
 use crate::interaction::{MaterialId, TextureContext};
 use irradiant_bvh as bvh;
 use irradiant_math::{Point2, Point3, Ray, Vec3, hash};
@@ -234,8 +234,11 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
 
     fn intersect_many(&self, user: u32, rays: &[bvh::Ray], hits: &mut [Option<(f32, Hit)>]) {
         let User::Instance { instance: i, part } = self.group.users[user as usize] else {
-            for (ray, hit) in rays.iter().zip(hits) {
-                *hit = self.meet(user, ray);
+            match self.group.users[user as usize] {
+                User::Sphere { shape, sphere } => {
+                    self.each_near(sphere, rays, |i| hits[i] = self.meet_sphere(user, shape, sphere, &rays[i]));
+                }
+                _ => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.meet(user, ray)),
             }
             return;
         };
@@ -258,8 +261,11 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
 
     fn occluded_many(&self, user: u32, rays: &[bvh::Ray], out: &mut [bool]) {
         let User::Instance { instance: i, part } = self.group.users[user as usize] else {
-            for (ray, out) in rays.iter().zip(out) {
-                *out = self.meet(user, ray).is_some();
+            match self.group.users[user as usize] {
+                User::Sphere { shape, sphere } => self.each_near(sphere, rays, |i| {
+                    out[i] = self.meet_sphere(user, shape, sphere, &rays[i]).is_some();
+                }),
+                _ => rays.iter().zip(out).for_each(|(ray, out)| *out = self.meet(user, ray).is_some()),
             }
             return;
         };
@@ -297,6 +303,45 @@ impl<A: AlphaTextures> bvh::Leaves for GroupLeaves<'_, A> {
 /// As many rays as a tree asks about at once.
 const MANY: usize = 16;
 
+/// Which of up to [`MANY`] rays do not clearly miss a sphere, a bit for each.
+struct NearSphere<'a> {
+    sphere: &'a Sphere,
+    rays: &'a [bvh::Ray],
+}
+
+impl bvh::Kernel for NearSphere<'_> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let Self { sphere, rays } = self;
+        let (mut o, mut d, mut t_max) = ([[0.0; MANY]; 3], [[0.0; MANY]; 3], [0.0; MANY]);
+        for (i, ray) in rays.iter().take(MANY).enumerate() {
+            for axis in 0..3 {
+                (o[axis][i], d[axis][i]) = (ray.o[axis], ray.d[axis]);
+            }
+            t_max[i] = ray.t_max;
+        }
+        let mut near = [0u32; MANY];
+        for i in 0..MANY {
+            let (o, d) = ([o[0][i], o[1][i], o[2][i]], [d[0][i], d[1][i], d[2][i]]);
+            let (o, d) = sphere.placement.ray_to_shape(&Ray::new(o.into(), d.into(), 0.0));
+            near[i] = u32::from(!sphere.is_clearly_missed(o, d, t_max[i])) << i;
+        }
+        let all = near.iter().fold(0, |all, bit| all | bit);
+        all & ((1u64 << rays.len()) - 1) as u32
+    }
+}
+
+fn hit_of_user(user: u32, t: f32, u: f32, v: f32) -> Hit {
+    Hit { t, u, v, primitive: user, of: HitOf::User, instances: [NO_INSTANCE; 2] }
+}
+
+/// Whether a root counts with 0 < t < t_max, first as a double, then as the single that is reported.
+#[inline]
+fn is_within(t: f64, t_max: f32) -> bool {
+    t > 0.0 && (t as f32) > 0.0 && (t as f32) < t_max
+}
+
 fn rays_to_group(instance: &Instance, rays: &[bvh::Ray]) -> [bvh::Ray; MANY] {
     let mut local = [bvh::Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; MANY];
     for (local, ray) in local.iter_mut().zip(rays) {
@@ -312,26 +357,16 @@ fn context(p: Point3, n: Vec3, uv: Point2, face: u32) -> TextureContext {
 impl<A: AlphaTextures> GroupLeaves<'_, A> {
     fn meet(&self, user: u32, ray: &bvh::Ray) -> Option<(f32, Hit)> {
         let shapes = &self.geometry.shapes;
-        let hit = |t: f32, u: f32, v: f32| Hit { t, u, v, primitive: user, is_user: true, instances: [NO_INSTANCE; 2] };
-        // A root counts with 0 < t < t_max, first as a double, then as the single that is reported.
-        let within = |t: f64| t > 0.0 && (t as f32) > 0.0 && (t as f32) < ray.t_max;
+        let hit = |t: f32, u: f32, v: f32| hit_of_user(user, t, u, v);
+        let within = |t: f64| is_within(t, ray.t_max);
         match self.group.users[user as usize] {
             User::Sphere { shape, sphere } => {
                 let s = &shapes.spheres[sphere as usize];
-                let single = to_ray(ray);
-                let (o, d) = s.placement.ray_to_shape(&single);
+                let (o, d) = s.placement.ray_to_shape(&to_ray(ray));
                 if s.is_clearly_missed(o, d, ray.t_max) {
                     return None;
                 }
-                let roots = s.roots(o, d)?;
-                (0..2).find_map(|i| {
-                    let t = roots[i];
-                    let p = within(t).then(|| s.point(o, d, t)).flatten()?;
-                    let there = self.is_there(shape, &single, i > 0, || {
-                        context(s.placement.point(p).0, s.placement.unit_normal(p).0.as_vec(), s.uv(p), 0)
-                    });
-                    there.then(|| (t as f32, hit(t as f32, i as f32, 0.0)))
-                })
+                self.meet_sphere(user, shape, sphere, ray)
             }
             User::Cylinder { shape, cylinder } => {
                 let c = &shapes.cylinders[cylinder as usize];
@@ -397,6 +432,36 @@ impl<A: AlphaTextures> GroupLeaves<'_, A> {
         }
     }
 
+    /// A sphere that may be met.
+    #[inline]
+    fn meet_sphere(&self, user: u32, shape: u32, sphere: u32, ray: &bvh::Ray) -> Option<(f32, Hit)> {
+        let s = &self.geometry.shapes.spheres[sphere as usize];
+        let single = to_ray(ray);
+        let (o, d) = s.placement.ray_to_shape(&single);
+        let roots = s.roots(o, d)?;
+        (0..2).find_map(|i| {
+            let t = roots[i];
+            let p = is_within(t, ray.t_max).then(|| s.point(o, d, t)).flatten()?;
+            let there = self.is_there(shape, &single, i > 0, || {
+                context(s.placement.point(p).0, s.placement.unit_normal(p).0.as_vec(), s.uv(p), 0)
+            });
+            there.then(|| (t as f32, hit_of_user(user, t as f32, i as f32, 0.0)))
+        })
+    }
+
+    /// Looks at the rays that do not clearly miss a sphere.
+    #[inline]
+    fn each_near(&self, sphere: u32, rays: &[bvh::Ray], mut look: impl FnMut(usize)) {
+        let sphere = &self.geometry.shapes.spheres[sphere as usize];
+        for (k, rays) in rays.chunks(MANY).enumerate() {
+            let mut near = self.geometry.level.run(NearSphere { sphere, rays });
+            while near != 0 {
+                look(MANY * k + near.trailing_zeros() as usize);
+                near &= near - 1;
+            }
+        }
+    }
+
     /// Whether a user primitive of `shape` is there for a ray. A ray that has passed its first hit looks at the second
     /// with a choice of its own, like pbrt's, which starts a new ray there.
     #[inline]
@@ -422,6 +487,39 @@ impl<A> Copy for GroupLeaves<'_, A> {}
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::placement::Placement;
+    use irradiant_testkit::Rng;
+
+    // Any number of rays, at all levels: near are those of which one alone is not told that it clearly misses.
+    #[test]
+    fn rays_near_a_sphere_are_those_that_one_by_one_do_not_clearly_miss() {
+        let mut rng = Rng::new(4);
+        let placement = Placement::new(&irradiant_math::Transform::translate(3.0, -2.0, 0.5), false);
+        let sphere = Sphere::new(0.5, -0.5, 0.5, 360.0, placement.expect("a translation is affine"));
+        let mut told = [0; 2];
+        for i in 0..4000 {
+            let rays: Vec<bvh::Ray> = (0..1 + i % MANY)
+                .map(|_| {
+                    let [o, to] = [rng.direction(), rng.direction()].map(Vec3::from);
+                    let o = Point3::new(3.0, -2.0, 0.5) + o * [0.5, 0.8, 40.0][i % 3];
+                    let d = Point3::new(3.0, -2.0, 0.5) + to * 0.6 - o;
+                    let t_max = if rng.next_f32() < 0.5 { f32::INFINITY } else { 1.5 * rng.next_f32() };
+                    to_tree(&Ray::new(o, d, 0.0), t_max)
+                })
+                .collect();
+            let expected = rays.iter().enumerate().fold(0, |near, (k, ray)| {
+                let (o, d) = sphere.placement.ray_to_shape(&to_ray(ray));
+                let is_missed = sphere.is_clearly_missed(o, d, ray.t_max);
+                told[usize::from(is_missed)] += 1;
+                near | u32::from(!is_missed) << k
+            });
+            for level in bvh::Level::available() {
+                let near = level.run(NearSphere { sphere: &sphere, rays: &rays });
+                assert_eq!(near, expected, "{level:?} {rays:?}");
+            }
+        }
+        assert!(told.iter().all(|&n| n > 4000), "{told:?}");
+    }
 
     // Meshes of one triangle, of none, of many, and ends that fall on the guide's entries.
     #[test]

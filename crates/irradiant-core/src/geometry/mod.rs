@@ -77,16 +77,25 @@ pub struct Hit {
     pub(crate) v: f32,
     /// Index in its tree.
     pub(crate) primitive: u32,
-    /// Not a triangle.
-    pub(crate) is_user: bool,
+    /// What kind of primitive.
+    pub(crate) of: HitOf,
     /// Instances from outside in.
     pub(crate) instances: [u32; 2],
+}
+
+/// What kind of primitive is hit. As large as the numbers beside it: hits with a byte in them are copied in pieces that overlap, which wait for
+/// each other in the processor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum HitOf {
+    Triangle,
+    User,
 }
 
 fn hit_of(closest: bvh::Closest<Hit>) -> Hit {
     match closest {
         bvh::Closest::Triangle(bvh::Hit { t, u, v, primitive }) => {
-            Hit { t, u, v, primitive, is_user: false, instances: [NO_INSTANCE; 2] }
+            Hit { t, u, v, primitive, of: HitOf::Triangle, instances: [NO_INSTANCE; 2] }
         }
         bvh::Closest::User { hit, .. } => hit,
     }
@@ -264,6 +273,37 @@ impl Geometry {
         self.fill(0, &to_tree(ray, f32::INFINITY), hit, hit.instances, at);
     }
 
+    /// The same, but that neither parameters nor derivatives other than the first need be told where `is_plain` says so of a material and a
+    /// light: those of spheres are not.
+    pub fn fill_in_plainly(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        at: &mut Interaction,
+        is_plain: impl FnOnce(MaterialId, Option<LightId>) -> bool,
+    ) {
+        if hit.of == HitOf::Triangle || hit.instances[0] != NO_INSTANCE {
+            return self.fill_in(ray, hit, at);
+        }
+        let User::Sphere { shape, sphere } = self.groups[0].users[hit.primitive as usize] else {
+            return self.fill_in(ray, hit, at);
+        };
+        let info = &self.shapes.infos[shape as usize];
+        let light = match info.first_emitter {
+            NO_EMITTER => None,
+            emitter => self.lights[emitter as usize],
+        };
+        if !is_plain(info.material, light) {
+            return self.fill_in(ray, hit, at);
+        }
+        // The root was there when the ray met it.
+        if let Some(placed) = self.shapes.spheres[sphere as usize].place(ray, hit.u as usize) {
+            (at.p, at.p_error, at.n, at.ns) = (placed.p, placed.p_error, placed.n, placed.n);
+            (at.dpdu, at.dpdus) = (placed.dpdu, placed.dpdu);
+        }
+        (at.material, at.shape, at.light) = (info.material, ShapeId(shape), light);
+    }
+
     /// Fills in a hit in the space of a group.
     fn fill(&self, group: u32, ray: &bvh::Ray, hit: &Hit, instances: [u32; 2], at: &mut Interaction) {
         if instances[0] != NO_INSTANCE {
@@ -275,7 +315,7 @@ impl Geometry {
         }
         let group = &self.groups[group as usize];
         let shapes = &self.shapes;
-        let (shape, emitter) = if hit.is_user {
+        let (shape, emitter) = if hit.of == HitOf::User {
             let single = accel::to_ray(ray);
             let mut quadric = |placed: Option<placement::Placed>| {
                 // The roots were there when the ray met them, and this is the same computation.

@@ -124,14 +124,14 @@ impl Placement {
     }
 
     /// The ray's origin and direction in shape space; parameters stay the same.
-    #[inline]
+    #[inline(always)]
     pub fn ray_to_shape(&self, ray: &Ray) -> (Double3, Double3) {
         let o = double(ray.o.to_array());
         let d = double(ray.d.to_array());
         (self.point_to_shape(o), axes(|i| self.inv[i][0] * d[0] + self.inv[i][1] * d[1] + self.inv[i][2] * d[2]))
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn point_to_shape(&self, p: Double3) -> Double3 {
         axes(|i| self.inv[i][0] * p[0] + self.inv[i][1] * p[1] + self.inv[i][2] * p[2] + self.inv[i][3])
     }
@@ -191,6 +191,7 @@ impl Placement {
     }
 
     /// A hit with its parametrisation.
+    #[inline(always)]
     pub fn place(&self, at: &Parametric) -> Placed {
         let (p, p_error) = self.point(at.p);
         let n = self.normal(at.n);

@@ -62,7 +62,7 @@ impl Sphere {
 
     /// True when no root, as it is computed and rounded, is one of 0 to `t_max`: without roots and quotients. Most rays that meet the box do
     /// not meet the sphere: they pass it, or end before it, as those do that ask for what is in the way of its light.
-    #[inline]
+    #[inline(always)]
     pub fn is_clearly_missed(&self, o: Double3, d: Double3, t_max: f32) -> bool {
         let (a, b, c) = (dot(d, d), dot(o, d), dot(o, o));
         let end = add(o, scale(d, t_max as f64));
@@ -86,7 +86,7 @@ impl Sphere {
     }
 
     /// Surface parameters of a point of the sphere.
-    #[inline]
+    #[inline(always)]
     pub fn uv(&self, p: Double3) -> Point2 {
         let theta = elementary::safe_acos((p[2] / self.radius) as f32);
         let range = self.theta_z_max - self.theta_z_min;
@@ -94,6 +94,7 @@ impl Sphere {
         Point2::new((azimuth(p) / self.phi_max).min(1.0), v)
     }
 
+    #[inline(always)]
     fn parametric(&self, p: Double3) -> Parametric {
         let phi_max = self.phi_max as f64;
         let range = (self.theta_z_max - self.theta_z_min) as f64;
@@ -109,7 +110,8 @@ impl Sphere {
         Parametric { p, n, uv, dpdu, dpdv, dndu: scale(dpdu, per_radius), dndv: scale(dpdv, per_radius) }
     }
 
-    /// The hit of `ray` at root number `root` (0 or 1).
+    /// The hit of `ray` at root number `root` (0 or 1). What is not looked at is not computed either.
+    #[inline(always)]
     pub fn place(&self, ray: &Ray, root: usize) -> Option<Placed> {
         let (o, d) = self.placement.ray_to_shape(ray);
         let t = self.roots(o, d)?[root];

@@ -2,7 +2,7 @@
 
 use super::accel::{Group, NO_EMITTER, Shapes};
 use super::triangle::{normal_and_length, triangle_point};
-use super::{Geometry, Hit, Level, NO_INSTANCE};
+use super::{Geometry, Hit, HitOf, Level, NO_INSTANCE};
 use crate::interaction::{Interaction, LightId, MaterialId, ReferencePoint};
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
 use irradiant_math::{Frame, Point2, Vec3};
@@ -136,7 +136,7 @@ impl Geometry {
         lanes: &mut TriangleLanes,
         i: usize,
     ) -> Option<(MaterialId, Option<LightId>)> {
-        if hit.is_user || hit.instances[0] != NO_INSTANCE {
+        if hit.of == HitOf::User || hit.instances[0] != NO_INSTANCE {
             return None;
         }
         let flat = match self.flat_triangles.get(hit.primitive as usize) {

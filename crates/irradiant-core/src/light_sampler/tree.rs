@@ -120,6 +120,14 @@ impl<T: Number> Cones<T> {
     }
 }
 
+impl Cones<f32> {
+    /// Whether there is no such child: its importance is 0.
+    #[inline(always)]
+    pub fn is_absent(&self) -> bool {
+        !(self.power > 0.0)
+    }
+}
+
 /// Four children; absent ones have power 0.
 #[derive(Clone, Debug)]
 #[repr(align(16))]

@@ -2,7 +2,8 @@
 //!
 //! The children of a vector's worth of nodes are put side by side, four lanes for each point, so that one loop computes all
 //! importances ([`Cones::importance`]) and one chooses ([`choose`]), with the bits of a walk alone. Nodes are copied in rows of four: no
-//! lane is fetched by itself.
+//! lane is fetched by itself. Where all points are at one node, as at the root, its children come one after the other instead, each for
+//! all points, and absent ones not at all.
 
 use super::tree::{Cones, LEAF, Node, Place, TreeSampler, WIDTH, choose, sum};
 use super::{LightSampler, Part, PickedLight};
@@ -13,6 +14,8 @@ use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
 /// Points that are looked at together.
 const POINTS: usize = WHOLE;
 
+/// A number of each point.
+type Points = [f32; POINTS];
 /// A number of each child of as many nodes.
 type Children = [f32; WIDTH * POINTS];
 
@@ -124,7 +127,6 @@ impl TreeSampler {
         pmf: &mut Floats,
     ) {
         let mut n = 0;
-        walks.step.holds = NOWHERE;
         for &lane in lanes {
             let i = lane as usize;
             (id[i], pmf[i]) = (0, 0.0);
@@ -170,7 +172,6 @@ impl TreeSampler {
         pmf: &mut Floats,
     ) {
         let mut n = 0;
-        walks.step.holds = NOWHERE;
         for &lane in lanes {
             let i = lane as usize;
             let place = self.places[id[i] as usize];
@@ -216,14 +217,10 @@ impl Kernel for Descend<'_> {
     fn run(self) {
         let Self { nodes, walks, n, at } = self;
         for first in (0..n).step_by(POINTS) {
-            walks.importances(nodes, first, n, at);
-            let all = &walks.step.importances;
-            for k in 0..POINTS {
-                let i = first + k;
-                let step = choose(&[all[4 * k], all[4 * k + 1], all[4 * k + 2], all[4 * k + 3]], walks.u[i]);
-                walks.child[i] = if step.is_good { step.lane } else { NOWHERE };
-                walks.pmf[i] *= step.share;
-                walks.u[i] = step.u;
+            if walks.importances(nodes, first, n, at) {
+                walks.descend(first, Step::by_child);
+            } else {
+                walks.descend(first, Step::by_point);
             }
         }
     }
@@ -243,18 +240,10 @@ impl Kernel for Ascend<'_> {
     fn run(self) {
         let Self { nodes, walks, n, at } = self;
         for first in (0..n).step_by(POINTS) {
-            walks.importances(nodes, first, n, at);
-            let all = &walks.step.importances;
-            for k in 0..POINTS {
-                let i = first + k;
-                let four = [all[4 * k], all[4 * k + 1], all[4 * k + 2], all[4 * k + 3]];
-                let child = walks.child[i];
-                let pick = |a: f32, lane: u32, b: f32| if child == lane { a } else { b };
-                let importance = pick(four[0], 0, pick(four[1], 1, pick(four[2], 2, four[3])));
-                let is_good = importance > 0.0;
-                let pmf = walks.pmf[i] * (importance / sum(&four));
-                walks.pmf[i] = if is_good { pmf } else { 0.0 };
-                walks.child[i] = if is_good { child } else { NOWHERE };
+            if walks.importances(nodes, first, n, at) {
+                walks.ascend(first, Step::by_child);
+            } else {
+                walks.ascend(first, Step::by_point);
             }
         }
     }
@@ -264,38 +253,75 @@ impl Kernel for Ascend<'_> {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct Step {
-    /// The node whose children these are for all points, if they are of one.
-    holds: u32,
     cones: Cones<Children>,
     p: [Children; 3],
     n: [Children; 3],
     importances: Children,
+    /// The same, child by child, where all points are at one node.
+    by_child: [Points; WIDTH],
 }
 
 impl Step {
     const NEW: Self = {
         let zero = [0.0; WIDTH * POINTS];
-        Self { holds: NOWHERE, cones: Cones::splat(zero), p: [zero; 3], n: [zero; 3], importances: zero }
+        let by_child = [[0.0; POINTS]; WIDTH];
+        Self { cones: Cones::splat(zero), p: [zero; 3], n: [zero; 3], importances: zero, by_child }
     };
+
+    /// The importances of the children of one node, from the points of these lanes.
+    #[inline(always)]
+    fn children_of(&mut self, node: &Node, lane: impl Fn(usize) -> usize, at: PointLanes) {
+        let (mut p, mut n) = ([[0.0; POINTS]; 3], [[0.0; POINTS]; 3]);
+        for k in 0..POINTS {
+            let lane = lane(k);
+            let (point, normal) = (at.p.point(lane).to_array(), at.ns.normal(lane).to_array());
+            for axis in 0..3 {
+                (p[axis][k], n[axis][k]) = (point[axis], normal[axis]);
+            }
+        }
+        for (child, importances) in self.by_child.iter_mut().enumerate() {
+            let cones = node.cones.of(|row| row[child]);
+            if cones.is_absent() {
+                *importances = [0.0; POINTS];
+                continue;
+            }
+            for k in 0..POINTS {
+                let n = [n[0][k], n[1][k], n[2][k]];
+                let has_normal = (n[0] != 0.0) | (n[1] != 0.0) | (n[2] != 0.0);
+                importances[k] = cones.importance([p[0][k], p[1][k], p[2][k]], n, has_normal);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn by_child(&self, k: usize) -> [f32; WIDTH] {
+        let [a, b, c, d] = &self.by_child;
+        [a[k], b[k], c[k], d[k]]
+    }
+
+    #[inline(always)]
+    fn by_point(&self, k: usize) -> [f32; WIDTH] {
+        let all = &self.importances;
+        [all[4 * k], all[4 * k + 1], all[4 * k + 2], all[4 * k + 3]]
+    }
 }
 
 impl TreeLanes {
-    /// Those of the walks from `first` on.
+    /// Those of the walks from `first` on. Whether they are child by child.
     #[inline(always)]
-    fn importances(&mut self, nodes: &[Node], first: usize, n: usize, at: PointLanes) {
+    fn importances(&mut self, nodes: &[Node], first: usize, n: usize, at: PointLanes) -> bool {
         let step = &mut self.step;
         // What is beyond the last walk is that one's again.
         let walk = |k: usize| (first + k).min(n - 1);
-        // At the root all are at one node, as all of the vector before were.
         let at_first = self.node[first];
-        let is_one = (0..POINTS).fold(true, |is_one, k| is_one & (self.node[walk(k)] == at_first));
-        if !(is_one && step.holds == at_first) {
-            for k in 0..POINTS {
-                let node = &nodes[self.node[walk(k)] as usize];
-                let place = WIDTH * k..WIDTH * k + WIDTH;
-                step.cones.put(&node.cones, |all, row| all[place.clone()].copy_from_slice(row));
-            }
-            step.holds = if is_one { at_first } else { NOWHERE };
+        if (0..POINTS).fold(true, |is_one, k| is_one & (self.node[walk(k)] == at_first)) {
+            step.children_of(&nodes[at_first as usize], |k| self.lane[walk(k)] as usize, at);
+            return true;
+        }
+        for k in 0..POINTS {
+            let node = &nodes[self.node[walk(k)] as usize];
+            let place = WIDTH * k..WIDTH * k + WIDTH;
+            step.cones.put(&node.cones, |all, row| all[place.clone()].copy_from_slice(row));
         }
         for k in 0..POINTS {
             let (lane, place) = (self.lane[walk(k)] as usize, WIDTH * k..WIDTH * k + WIDTH);
@@ -310,6 +336,34 @@ impl TreeLanes {
             let n = [step.n[0][i], step.n[1][i], step.n[2][i]];
             let has_normal = (n[0] != 0.0) | (n[1] != 0.0) | (n[2] != 0.0);
             step.importances[i] = cones.importance([step.p[0][i], step.p[1][i], step.p[2][i]], n, has_normal);
+        }
+        false
+    }
+
+    /// Chooses by the importances of the children, which `four` finds.
+    #[inline(always)]
+    fn descend(&mut self, first: usize, four: impl Fn(&Step, usize) -> [f32; WIDTH]) {
+        for k in 0..POINTS {
+            let i = first + k;
+            let step = choose(&four(&self.step, k), self.u[i]);
+            self.child[i] = if step.is_good { step.lane } else { NOWHERE };
+            self.pmf[i] *= step.share;
+            self.u[i] = step.u;
+        }
+    }
+
+    /// The chance that a walk down would have come here.
+    #[inline(always)]
+    fn ascend(&mut self, first: usize, four: impl Fn(&Step, usize) -> [f32; WIDTH]) {
+        for k in 0..POINTS {
+            let (i, four) = (first + k, four(&self.step, k));
+            let child = self.child[i];
+            let pick = |a: f32, lane: u32, b: f32| if child == lane { a } else { b };
+            let importance = pick(four[0], 0, pick(four[1], 1, pick(four[2], 2, four[3])));
+            let is_good = importance > 0.0;
+            let pmf = self.pmf[i] * (importance / sum(&four));
+            self.pmf[i] = if is_good { pmf } else { 0.0 };
+            self.child[i] = if is_good { child } else { NOWHERE };
         }
     }
 }

@@ -69,6 +69,11 @@ impl Batch {
         }
     }
 
+    /// Whether a light, if any, is known to shine evenly.
+    pub fn is_plain_lamp(&self, light: Option<LightId>) -> bool {
+        light.is_none_or(|id| matches!(self.known_lamps.get(id.0 as usize), Some(Some(_))))
+    }
+
     /// The light of the lamps that paths meet, weighed against having sampled it.
     pub fn light_of_lamps(&mut self, depth: u32, scene: &Scene, radiance: &mut [SampledSpectrum]) {
         // Whose weight is asked for: not what the camera sees, by itself or in mirrors, nor where all lights are sampled.

@@ -192,11 +192,13 @@ impl PathIntegrator {
         radiance: &mut SampledSpectrum,
         stats: &mut RenderStats,
     ) {
-        let Some(hit) = &b.met[i] else { return };
+        let Some(hit) = b.met[i] else { return };
         let ray = b.ray(i);
         let mut at = Interaction::unknown(&ray, hit.t);
-        scene.geometry.fill_in(&ray, hit, &mut at);
         let lambda = sample.lambda;
+        scene.geometry.fill_in_plainly(&ray, &hit, &mut at, |material, light| {
+            b.is_plain_lamp(light) && !matches!(b.plain(scene, material, &lambda), Plain::Other)
+        });
         let frame = match b.plain(scene, at.material, &lambda) {
             Plain::Diffuse(reflectance) => {
                 b.set_diffuse(i, reflectance);

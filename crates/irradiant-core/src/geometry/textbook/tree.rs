@@ -4,7 +4,7 @@ use super::number::{Number, Triple, cross, dot, school_roots, sub};
 use super::{Met, Question};
 use crate::geometry::accel::{GroupLeaves, User};
 use crate::geometry::instance::Motion;
-use crate::geometry::{Alpha, AlphaTextures, Geometry, Hit, NO_INSTANCE};
+use crate::geometry::{Alpha, AlphaTextures, Geometry, Hit, HitOf, NO_INSTANCE};
 use irradiant_bvh as bvh;
 use irradiant_bvh::Leaves;
 use irradiant_math::Bounds3;
@@ -252,7 +252,7 @@ fn gather<T: Number>(geometry: &Geometry, group: u32, through: Option<u32>, foun
                 u: 0.0,
                 v: 0.0,
                 primitive: range.first + i as u32,
-                is_user: false,
+                of: HitOf::Triangle,
                 instances: [through.unwrap_or(NO_INSTANCE), NO_INSTANCE],
             };
             let p = outside.map(|p| p.to_array().map(|c| T::of(f64::from(c))));
@@ -260,7 +260,7 @@ fn gather<T: Number>(geometry: &Geometry, group: u32, through: Option<u32>, foun
         }
     }
     for (i, user) in group.users.iter().enumerate() {
-        let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: i as u32, is_user: true, instances: [NO_INSTANCE; 2] };
+        let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: i as u32, of: HitOf::User, instances: [NO_INSTANCE; 2] };
         let opaque = |shape: u32| shapes.infos[shape as usize].alpha == Alpha::Opaque;
         let mut add = |form, bounds| found.push((Primitive { form, hit }, bounds));
         match *user {
