@@ -36,7 +36,7 @@ pub struct BuildInput<'a> {
 pub struct BuildSettings {
     /// Cost of testing a node's eight boxes and sorting what was hit.
     pub node_cost: f32,
-    /// Cost of testing a block of up to five triangles.
+    /// Cost of testing a block of up to five triangles; less in trees that are too large for the cache.
     pub block_cost: f32,
     /// Cost of testing a user primitive.
     pub user_cost: f32,
@@ -46,7 +46,7 @@ pub struct BuildSettings {
 
 impl Default for BuildSettings {
     fn default() -> Self {
-        Self { node_cost: 1.0, block_cost: 0.3, user_cost: 2.0, max_leaf_blocks: 4 }
+        Self { node_cost: 1.0, block_cost: 0.6, user_cost: 2.0, max_leaf_blocks: 4 }
     }
 }
 

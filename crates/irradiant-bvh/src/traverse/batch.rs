@@ -144,8 +144,8 @@ impl Bvh {
 const SMALL: usize = 8;
 /// Expected cost of a ray at most in larger trees.
 ///
-/// In the same way, by expected cost when a block cost 0.6 (now 0.15, which makes it 0.8 of that): 1.6 0.98, 0.97 and 1.00 (a million triangles), 2.9 0.98, 3.2 0.99, 3.3 0.94, 3.5 0.99, 4.1 1.06, 6.0 0.97, 7.4 1.03.
-const SHALLOW: f64 = 3.2;
+/// In the same way, by expected cost: 1.6 0.98, 0.97 and 1.00 (a million triangles), 2.9 0.98, 3.2 0.99, 3.3 0.94, 3.5 0.99, 4.1 1.06, 6.0 0.97, 7.4 1.03.
+const SHALLOW: f64 = 4.0;
 /// Crowds of fewer rays are not worth it.
 const LEAST: usize = 4;
 
