@@ -87,7 +87,7 @@ fn picture_tables(reports: &[Report]) -> String {
     }
     let _ = writeln!(
         out,
-        "\n`sharedpath` shares indirect light among the pixels of 4 by 4 blocks: their errors go together, so that less is gained where one looks at more than \
+        "\n`sharedpath` shares indirect light and that of the sky among the pixels of 4 by 4 blocks: their errors go together, so that less is gained where one looks at more than \
          single pixels. The same measure, of means over {BLOCK} by {BLOCK} pixels:\n\n| scene | `path` / best | `sharedpath` / best | best peer by this |\n|---|---|---|---|"
     );
     for r in reports {
