@@ -98,7 +98,7 @@ pub(crate) fn all_are_sampled(scene: &Scene, splits: u32) -> bool {
 }
 
 /// Light that arrives straight from sampled points of sampled lights and is scattered along the path, the choice of the light split into
-/// `splits` strata. Samples of the light `except` are drawn, but do not count.
+/// `splits` strata. Where the light `except` is picked, it is not sampled: others see to it.
 #[inline(always)]
 pub(crate) fn direct_light<R: PathRecorder>(
     scene: &Scene,

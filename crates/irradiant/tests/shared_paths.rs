@@ -118,21 +118,25 @@ fn all_sorts_of_surfaces_and_lights() {
     assert_shared_is_right(&scene, "sharedpath lights=2", How::new(32, 12).depth(3).spectral(), 0.06);
 }
 
+/// Stripes of two materials at z = 0.99, two pixels wide for a camera of 8 pixels and 45 degrees at this distance.
+fn stripes(a: &str, b: &str, distance: f32) -> String {
+    let width = 2.0 * (2.0 * distance * (22.5f32).to_radians().tan() / 8.0);
+    let stripe = |i: i32| {
+        let x = i as f32 * width;
+        let front = quad([[x, -0.9, 0.99], [x + width, -0.9, 0.99], [x + width, 0.9, 0.99], [x, 0.9, 0.99]]);
+        if i % 2 == 0 { a } else { b }.to_string() + &front
+    };
+    (-4..4).map(stripe).collect()
+}
+
 /// A box with a point light whose front wall is cut into stripes of two materials, two pixels wide, so that each block of pixels sees both.
 fn striped(a: &str, b: &str, behind: &str) -> String {
     let walls = [[0.8; 3]; 6];
     let room = cube(walls).replacen("Material \"diffuse\" \"rgb reflectance\" [ 0.8 0.8 0.8 ]", behind, 1);
-    let mut scene = film(8)
+    let scene = film(8)
         + "LookAt 0 0 0.5  0 0 1  0 1 0\nCamera \"perspective\" \"float fov\" 45\nWorldBegin\nLightSource \"point\" \"rgb I\" [ 1 1 1 ] \"point3 from\" [ 0 0 -0.5 ]\n"
         + &room;
-    // Two pixels at the wall's distance.
-    let width = 2.0 * (2.0 * 0.49 * (22.5f32).to_radians().tan() / 8.0);
-    for i in -4..4 {
-        let x = i as f32 * width;
-        scene += if i % 2 == 0 { a } else { b };
-        scene += &quad([[x, -0.9, 0.99], [x + width, -0.9, 0.99], [x + width, 0.9, 0.99], [x, 0.9, 0.99]]);
-    }
-    scene
+    scene + &stripes(a, b, 0.49)
 }
 
 /// Compares the mean of like stripes, which no companions of another kind can hide: each must be right to `power`.
@@ -190,19 +194,13 @@ fn sunny() -> String {
 
 /// Stripes of two materials as in [`striped`], outside, behind what hides parts of the sky.
 fn striped_outside(a: &str, b: &str) -> String {
-    let mut scene = film(8)
+    let scene = film(8)
         + "LookAt 0 0 0  0 0 1  0 1 0\nCamera \"perspective\" \"float fov\" 45\nWorldBegin\n"
         + &sunny()
         + &diffuse(0.3, 0.5, 0.6)
         + &quad([[-0.7, 0.5, 0.3], [0.2, 0.5, 0.2], [0.1, 0.6, 0.8], [-0.8, 0.6, 0.8]])
         + &quad([[0.5, -1.0, 0.2], [0.5, 0.1, 0.3], [0.6, 0.2, 0.8], [0.6, -1.0, 0.8]]);
-    let width = 2.0 * (2.0 * 0.99 * (22.5f32).to_radians().tan() / 8.0);
-    for i in -4..4 {
-        let x = i as f32 * width;
-        scene += if i % 2 == 0 { a } else { b };
-        scene += &quad([[x, -0.9, 0.99], [x + width, -0.9, 0.99], [x + width, 0.9, 0.99], [x, 0.9, 0.99]]);
-    }
-    scene
+    scene + &stripes(a, b, 0.99)
 }
 
 #[test]

@@ -39,7 +39,7 @@
 //! On two Zen 5 cores shared with others, single rays relative to the version before, in one process by turns (a room of many objects, one
 //! displaced mesh, ten thousand instances; a million triangles each but the last; runs differ by 1 to 2 %):
 //! - Blocks at a cost of 0.3 instead of 0.6 of a node (with 0.02 for each triangle): 1.03, memory 0.94. At 0.2 1.06, at 0.15 1.08, memory 0.90; at 0.1 or 0.06 in leaves of up to
-//!   six or eight blocks 1.05 and 1.07.
+//!   six or eight blocks 1.05 and 1.07. Trees that stay in the cache lose by it: see `build/collapse.rs`.
 //! - One block a leaf at most: 0.96.
 //! - The shear only at the first leaf: 0.97, primary rays in the mesh 0.93.
 //! - One child and two alike, without a branch on which it is: 0.95, primary rays in the room 0.90.
