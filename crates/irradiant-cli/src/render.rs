@@ -201,7 +201,7 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
         let threads = job_threads(arguments);
         let command: Vec<String> = std::env::args().collect();
         let mut json = clock.json(&rendering.stats, threads, &command);
-        json["pixels_without_samples"] = rendering.film.totals().pixels_without_samples.into();
+        json["pixels_without_samples"] = rendering.totals.pixels_without_samples.into();
         if let Some(books) = &audit {
             json["audit"] = stats::audit_as_json(&job.scene, books);
         }
@@ -219,7 +219,7 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     }
     if let (false, Some([least, most])) = (arguments.quiet, rendering.header.samples_taken) {
         say!("stopped early: {least} to {most} of {} samples per pixel", rendering.header.samples_per_pixel);
-        let (none, all) = (rendering.film.totals().pixels_without_samples, rendering.film.bounds().area());
+        let (none, all) = (rendering.totals.pixels_without_samples, rendering.film.bounds().area());
         if none > 0 {
             say!(
                 "warning: {none} of {all} pixels ({:.1} %) have no sample and show nothing; a longer --time, a smaller --resolution or --preview helps",
@@ -458,7 +458,7 @@ fn report_missing_light(job: &Job) {
 fn report_black(job: &Job, rendering: &Rendering) {
     let b = rendering.film.bounds();
     let pixels = || (b.y0..b.y1).flat_map(|y| (b.x0..b.x1).map(move |x| (x, y)));
-    let (splats, totals) = (rendering.film.has_splats(), rendering.film.totals());
+    let (splats, totals) = (rendering.film.has_splats(), rendering.totals);
     if !splats && pixels().all(|(x, y)| rendering.film.pixel(x, y).mean() == [0.0; 3]) && totals.samples > 0 {
         let whose = if totals.not_finite + totals.out_of_range > 0 { "paths that were not refused" } else { "paths" };
         say!(
@@ -471,7 +471,7 @@ fn report_black(job: &Job, rendering: &Rendering) {
 
 /// Refused samples are never hidden: how many, and where the first ones are; with the commands that replay them, if `probe` can.
 fn report_refused(job: &Job, rendering: &Rendering, arguments: &RenderArguments) {
-    let totals = rendering.film.totals();
+    let totals = rendering.totals;
     let refused = totals.not_finite + totals.out_of_range;
     if refused == 0 {
         return;

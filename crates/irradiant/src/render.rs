@@ -5,7 +5,7 @@ use crate::error::{Error, Report};
 use crate::header::Header;
 use crate::load::SceneFile;
 use crate::settings::{ColorMode, MaxDepth, RenderSettings};
-use irradiant_core::film::{DevelopOptions, Film};
+use irradiant_core::film::{DevelopOptions, Film, FilmTotals};
 use irradiant_core::scene::{CompileOptions, Scene};
 use irradiant_image::metadata::Chromaticities;
 use irradiant_image::{FileFormat, Image, ToneOptions, atomic_write};
@@ -171,7 +171,8 @@ impl Job {
         if (totals.min_count, totals.max_count) != (wanted, wanted) {
             header.samples_taken = Some([totals.min_count, totals.max_count]);
         }
-        Rendering { film, stats, header, variance: self.scene.layers.variance, color_space: self.scene.color_space() }
+        let (variance, color_space) = (self.scene.layers.variance, self.scene.color_space());
+        Rendering { film, totals, stats, header, variance, color_space }
     }
 }
 
@@ -179,6 +180,8 @@ impl Job {
 pub struct Rendering {
     /// Sums and counts.
     pub film: Film,
+    /// What they come to.
+    pub totals: FilmTotals,
     /// What was done.
     pub stats: RenderStats,
     /// What determines the pixels.

@@ -10,7 +10,7 @@ use irradiant_core::geometry::Kernel;
 use irradiant_core::light::SkyPoint;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Ray, Vec3, offset_ray_origin};
-use irradiant_spectrum::{N_WAVELENGTHS, SampledSpectrum, Wavelengths};
+use irradiant_spectrum::{Basis, N_WAVELENGTHS};
 
 /// A glimpse of the sky as the first vertices of its block have it.
 #[derive(Clone, Debug)]
@@ -34,8 +34,10 @@ struct Outlook {
     share: f32,
     /// See [`Glimpse::expected`].
     expected: f32,
-    /// Of those who test it, the inverse of the chance that they do; or 0.
+    /// Of those who test it, the inverse of the chance that they do; or 0. Once tested, 0 where something is in the way.
     inverse_chance: Sixteen,
+    /// Its radiance at the wavelengths of those who see it.
+    radiance: Spectra,
 }
 
 impl Outlook {
@@ -51,6 +53,7 @@ impl Outlook {
         share: 0.0,
         expected: 0.0,
         inverse_chance: [0.0; PIXELS],
+        radiance: [[0.0; PIXELS]; N_WAVELENGTHS],
     };
 
     fn ray(&self, i: usize, time: f32) -> Ray {
@@ -145,6 +148,27 @@ impl Kernel for Choose<'_> {
     }
 }
 
+/// What the tested directions bring to each first vertex.
+struct Bring<'a>(&'a [Outlook]);
+
+impl Kernel for Bring<'_> {
+    type Output = Spectra;
+    #[inline(always)]
+    fn run(self) -> Spectra {
+        let mut sums = [[0.0; PIXELS]; N_WAVELENGTHS];
+        for outlook in self.0 {
+            for k in 0..N_WAVELENGTHS {
+                for i in 0..PIXELS {
+                    let inverse_chance = outlook.inverse_chance[i];
+                    let light = outlook.f_cos[k][i] * outlook.radiance[k][i] * (outlook.share * inverse_chance);
+                    sums[k][i] += if inverse_chance > 0.0 { light } else { 0.0 };
+                }
+            }
+        }
+        sums
+    }
+}
+
 /// What sharing the sky needs, kept from batch to batch.
 pub(super) struct Outlooks {
     all: Vec<Outlook>,
@@ -172,22 +196,20 @@ impl Outlooks {
             let (outlooks, marks) = (&mut self.all[..n], &mut blocks.marks[block]);
             scene.geometry.level().run(Choose { outlooks, marks, tests: sky.tests as f32 });
             self.test(scene, n, blocks.receivers[block].time, stats);
-            let mut sums = [SampledSpectrum::ZERO; PIXELS];
-            for outlook in &self.all[..n] {
-                let mut known: Option<(Wavelengths, SampledSpectrum)> = None;
+            for outlook in &mut self.all[..n] {
+                let radiance = |i: usize| sky.sky.radiance(&outlook.glimpse.point, &samples[block * PIXELS + i].lambda);
+                if scene.basis() == Basis::Rgb {
+                    // The same for all.
+                    outlook.radiance = radiance(0).0.map(|value| [value; PIXELS]);
+                    continue;
+                }
                 for i in (0..PIXELS).filter(|i| outlook.inverse_chance[*i] > 0.0) {
-                    let lambda = &samples[block * PIXELS + i].lambda;
-                    // In the RGB basis all have the same.
-                    let radiance = match known {
-                        Some((of, radiance)) if of == *lambda => radiance,
-                        _ => sky.sky.radiance(&outlook.glimpse.point, lambda),
-                    };
-                    known = Some((*lambda, radiance));
-                    sums[i] += spectrum(&outlook.f_cos, i) * radiance * (outlook.share * outlook.inverse_chance[i]);
+                    set_spectrum(&mut outlook.radiance, i, radiance(i));
                 }
             }
-            for (own, sum) in blocks.own[block * PIXELS..].iter_mut().zip(sums) {
-                *own += sum;
+            let sums = scene.geometry.level().run(Bring(&self.all[..n]));
+            for (i, own) in blocks.own[block * PIXELS..][..PIXELS].iter_mut().enumerate() {
+                *own += spectrum(&sums, i);
             }
         }
     }
