@@ -128,6 +128,15 @@ impl Geometry {
         self.level
     }
 
+    /// Asks for the memory that [`Geometry::flat_triangle`] reads of a hit.
+    #[inline(always)]
+    pub fn prefetch_flat_triangle(&self, hit: &Hit) {
+        if let Some(flat) = self.flat_triangles.get(hit.primitive as usize) {
+            irradiant_bvh::prefetch_read(flat);
+            irradiant_bvh::prefetch_read(flat.as_ref().map_or(&NO_EMITTER, |flat| &flat.emitter));
+        }
+    }
+
     /// Puts a hit into a lane, if it is of a plain flat triangle; what it is made of and its light.
     #[inline]
     pub fn flat_triangle(
@@ -147,7 +156,7 @@ impl Geometry {
             }
         }?;
         (0..3).for_each(|k| lanes.corners[k].set(i, flat.corners[k]));
-        (lanes.u[i], lanes.v[i], lanes.flip[i]) = (hit.u, hit.v, flat.flip);
+        (lanes.u[i], lanes.v[i], lanes.flip[i]) = (hit.u, hit.v, u32::from(flat.flip));
         let light = match flat.emitter {
             NO_EMITTER => None,
             emitter => self.lights[emitter as usize],
@@ -160,15 +169,19 @@ impl Geometry {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FlatTriangle {
     corners: [[f32; 3]; 3],
-    flip: u32,
+    flip: bool,
     material: MaterialId,
     /// Index among faces that emit, or [`NO_EMITTER`].
     emitter: u32,
 }
 
+const _: () = assert!(size_of::<Option<FlatTriangle>>() == 48);
+
 impl FlatTriangle {
-    /// So many are put together beforehand, which asks less of a hit: 0.98 of the time in the Cornell box. More would not stay in a cache.
-    const FEW: usize = 1 << 13;
+    /// So many are put together beforehand, 48 bytes each, so that a hit waits for memory once, and that has been asked for
+    /// ([`Geometry::prefetch_flat_triangle`]), instead of for indices and then for corners. Share of the time: the Cornell box 0.98; a street of
+    /// 250,000 0.91 by paths, 0.96 by shared paths.
+    const MOST: usize = 1 << 20;
 
     #[inline]
     fn of(shapes: &Shapes, mesh_index: u32, triangle: u32) -> Option<Self> {
@@ -183,14 +196,14 @@ impl FlatTriangle {
             NO_EMITTER => NO_EMITTER,
             first => first + triangle,
         };
-        Some(Self { corners, flip: u32::from(mesh.flip), material: info.material, emitter })
+        Some(Self { corners, flip: mesh.flip, material: info.material, emitter })
     }
 
     /// Those of the tree of the scene itself, by primitive; none where they are many.
     pub(super) fn all(shapes: &Shapes, group: &Group) -> Vec<Option<Self>> {
         let meshes =
             || group.ranges.iter().map(|range| (range.mesh, shapes.meshes[range.mesh as usize].triangles.len()));
-        if meshes().map(|(_, triangles)| triangles).sum::<usize>() > Self::FEW {
+        if meshes().map(|(_, triangles)| triangles).sum::<usize>() > Self::MOST {
             return Vec::new();
         }
         meshes().flat_map(|(mesh, n)| (0..n as u32).map(move |i| Self::of(shapes, mesh, i))).collect()

@@ -116,6 +116,9 @@ impl PathIntegrator {
         let sees_light = !scene.lights.environments().is_empty();
         let (mut i, mut n_flat) = (0, 0);
         while i < n {
+            if let Some(Some(hit)) = b.met.get(i + 8) {
+                scene.geometry.prefetch_flat_triangle(hit);
+            }
             let Some(hit) = &b.met[i] else {
                 if sees_light {
                     let s = b.sample[i] as usize;
