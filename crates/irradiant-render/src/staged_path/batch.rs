@@ -6,7 +6,7 @@ use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
-use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
+use irradiant_core::geometry::{Hit, RayBatch, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
 use irradiant_core::light::{ImageInfiniteLight, SkyLanes, SkyPoint, TargetLanes};
@@ -125,8 +125,6 @@ pub(crate) struct Batch {
     pub(super) light_splits: u32,
     pub(super) throughput: SpectrumLanes,
     pub(super) roulette_scale: Floats,
-    /// Rays to the next vertices.
-    pub(super) rays: [Ray; LANES],
     pub(super) met: [Option<Hit>; LANES],
     pub(super) escape_place: [Option<Point2>; LANES],
     /// Which of the batch's samples.
@@ -145,7 +143,13 @@ pub(crate) struct Batch {
     pub(super) k: SpectrumLanes,
     pub(super) is_metal: [u32; LANES],
     pub(super) alphas: [Floats; 2],
+    /// Models of their own, and whose they are.
     pub(super) bsdfs: Vec<Bsdf>,
+    pub(super) bsdf_lanes: Vec<u32>,
+    /// 1 where light scatters that it is not known where to look for.
+    pub(super) seeks: [u32; LANES],
+    /// Whether any path has gone since the vertices were met.
+    pub(super) any_gone: bool,
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
 
@@ -188,10 +192,10 @@ pub(crate) struct Batch {
     /// The sky, while vertices share it, and their samples of it: lane, point, share of all samples, chance.
     pub(super) shared_sky: Option<LightId>,
     pub(super) sky_samples: Vec<(u32, SkyPoint, f32, f32)>,
-    pub(super) shadow_rays: Vec<Ray>,
-    pub(super) shadow_ends: Vec<f32>,
-    /// The sample that each would bring this to.
-    pub(super) shadow_light: Vec<(u32, SampledSpectrum)>,
+    /// Paths that ask what is in the way of their light.
+    pub(super) asking: [u32; LANES],
+    /// Their rays to the light, or all paths' rays to the next vertices.
+    pub(super) rays: RayBatch,
 
     // Directions of diffuse surfaces and metals.
     pub(super) next_o: Triples,
@@ -222,7 +226,6 @@ impl Batch {
             light_splits: 1,
             throughput: SpectrumLanes::ZERO,
             roulette_scale: [0.0; LANES],
-            rays: [Ray::new(Point3::ZERO, Vec3::Z, 0.0); LANES],
             met: [None; LANES],
             escape_place: [None; LANES],
             sample: [0; LANES],
@@ -237,6 +240,9 @@ impl Batch {
             is_metal: [0; LANES],
             alphas: [[1.0; LANES]; 2],
             bsdfs: Vec::new(),
+            bsdf_lanes: Vec::new(),
+            seeks: [0; LANES],
+            any_gone: false,
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
             lamps_met: Vec::new(),
@@ -264,9 +270,8 @@ impl Batch {
             light_pick: [0.0; LANES],
             shared_sky: None,
             sky_samples: Vec::new(),
-            shadow_rays: Vec::new(),
-            shadow_ends: Vec::new(),
-            shadow_light: Vec::new(),
+            asking: [0; LANES],
+            rays: RayBatch::NONE,
             next_o: Triples::ZERO,
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
@@ -416,18 +421,25 @@ impl Batch {
         self.eta.set(i, eta);
         self.k.set(i, k);
         (self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (1, x, y);
-        self.scattering[i] = Scattering::Metal;
+        (self.scattering[i], self.seeks[i]) = (Scattering::Metal, 1);
     }
 
     #[inline(always)]
     pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
         self.reflectance.set(i, reflectance);
-        self.scattering[i] = Scattering::Diffuse;
+        (self.scattering[i], self.seeks[i]) = (Scattering::Diffuse, u32::from(!reflectance.is_black()));
     }
 
     pub fn set_alone(&mut self, i: usize, bsdf: Bsdf) {
         self.scattering[i] = Scattering::Alone(self.bsdfs.len() as u32);
+        self.seeks[i] = u32::from(bsdf.flags().is_non_specular());
         self.bsdfs.push(bsdf);
+        self.bsdf_lanes.push(i as u32);
+    }
+
+    /// The path of a lane goes on elsewhere, or has ended.
+    pub fn set_gone(&mut self, i: usize) {
+        (self.scattering[i], self.seeks[i], self.any_gone) = (Scattering::Gone, 0, true);
     }
 
     /// All that lights look at.
@@ -466,11 +478,13 @@ impl Batch {
         level.run(Scatter(self, n));
         self.next_scale[..n].fill(1.0);
         self.specular[..n].fill(false);
-        for i in 0..n {
-            match self.scattering[i] {
-                Scattering::Diffuse | Scattering::Metal => {}
-                Scattering::Alone(k) => self.goes_on[i] = u32::from(self.scatter_alone(i, k as usize)),
-                Scattering::Gone => self.goes_on[i] = 0,
+        for k in 0..self.bsdfs.len() {
+            let i = self.bsdf_lanes[k] as usize;
+            self.goes_on[i] = u32::from(self.scatter_alone(i, k));
+        }
+        if self.any_gone {
+            for i in 0..n {
+                self.goes_on[i] = if self.scattering[i] == Scattering::Gone { 0 } else { self.goes_on[i] };
             }
         }
         if let Some((_, sky)) = scene.lights.sky() {
@@ -548,9 +562,7 @@ impl Batch {
                 self.shift(i, n);
             }
         }
-        for i in 0..n {
-            self.rays[i] = self.ray(i);
-        }
+        self.rays.take(n, &self.o, &self.d, &self.time, |_| f32::INFINITY);
         n
     }
 }

@@ -24,13 +24,12 @@ use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, Walk};
 use crate::record::NoRecord;
-use batch::{Scattering, Surface, nowhere};
+use batch::{Surface, nowhere};
 use irradiant_core::bxdf::Bxdf;
 use irradiant_core::interaction::Interaction;
 use irradiant_core::sampler::StreamLanes;
 use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
-use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{Basis, SampledSpectrum};
 use kernels::{Surfaces, Survive};
 
@@ -146,6 +145,8 @@ impl PathIntegrator {
         stats: &mut RenderStats,
     ) {
         b.bsdfs.clear();
+        b.bsdf_lanes.clear();
+        b.any_gone = false;
         b.lamps_met.clear();
         for i in 0..n {
             let s = b.sample[i] as usize;
@@ -217,7 +218,7 @@ impl PathIntegrator {
                 let bsdf = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, &mut after, mix);
                 let Some(bsdf) = bsdf else {
                     // An interface: the path would come to its next vertex one step after the others.
-                    b.scattering[i] = Scattering::Gone;
+                    b.set_gone(i);
                     let mut walk = b.walk(i, depth);
                     self.go_alone(&mut walk, radiance, scene, sample, stats);
                     return;
@@ -262,7 +263,7 @@ impl PathIntegrator {
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, n, scene);
         }
-        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         n
     }
 }
@@ -275,10 +276,12 @@ fn only_the_sky_counts(scene: &Scene) -> bool {
 
 /// Ends the paths whose rays meet anything. How many leave the scene.
 fn those_that_escape(b: &mut Batch, n: usize, scene: &Scene) -> usize {
-    let (ends, mut blocked) = ([f32::INFINITY; LANES], [false; LANES]);
-    scene.geometry.occluded_batch(&b.rays[..n], &ends[..n], &scene.alpha(), &mut blocked[..n]);
+    scene.geometry.occluded_rays(&mut b.rays, &scene.alpha());
     let mut escaping = 0;
-    for i in (0..n).filter(|&i| !blocked[i]) {
+    for i in 0..n {
+        if b.rays.is_blocked(i) {
+            continue;
+        }
         b.shift(escaping, i);
         b.met[escaping] = None;
         escaping += 1;
