@@ -66,12 +66,8 @@ impl RayBatch {
     pub fn take(&mut self, n: usize, o: &Triples, d: &Triples, time: &Floats, t_max: impl Fn(usize) -> f32) {
         self.n = n.min(LANES);
         for (i, ray) in self.rays.iter_mut().enumerate().take(n) {
-            *ray = bvh::Ray {
-                o: [o.x[i], o.y[i], o.z[i]],
-                t_max: t_max(i),
-                d: [d.x[i], d.y[i], d.z[i]],
-                time: time[i],
-            };
+            *ray =
+                bvh::Ray { o: [o.x[i], o.y[i], o.z[i]], t_max: t_max(i), d: [d.x[i], d.y[i], d.z[i]], time: time[i] };
         }
     }
 }

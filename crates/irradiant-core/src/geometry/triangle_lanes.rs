@@ -129,7 +129,7 @@ impl Geometry {
     }
 
     /// Puts a hit into a lane, if it is of a plain flat triangle; what it is made of and its light.
-    #[inline]
+    #[inline(always)]
     pub fn flat_triangle(
         &self,
         hit: &Hit,
@@ -139,20 +139,34 @@ impl Geometry {
         if hit.of == HitOf::User || hit.instances[0] != NO_INSTANCE {
             return None;
         }
-        let flat = match self.flat_triangles.get(hit.primitive as usize) {
-            Some(flat) => *flat,
-            None => {
-                let (mesh, triangle) = self.groups[0].triangle(hit.primitive);
-                FlatTriangle::of(&self.shapes, mesh, triangle)
-            }
-        }?;
+        match self.flat_triangles.get(hit.primitive as usize) {
+            Some(flat) => Some(self.put(flat.as_ref()?, hit, lanes, i)),
+            None => self.far_triangle(hit, lanes, i),
+        }
+    }
+
+    #[inline(always)]
+    fn put(
+        &self,
+        flat: &FlatTriangle,
+        hit: &Hit,
+        lanes: &mut TriangleLanes,
+        i: usize,
+    ) -> (MaterialId, Option<LightId>) {
         (0..3).for_each(|k| lanes.corners[k].set(i, flat.corners[k]));
         (lanes.u[i], lanes.v[i], lanes.flip[i]) = (hit.u, hit.v, flat.flip);
         let light = match flat.emitter {
             NO_EMITTER => None,
             emitter => self.lights[emitter as usize],
         };
-        Some((flat.material, light))
+        (flat.material, light)
+    }
+
+    /// The same of one of many triangles.
+    #[inline(never)]
+    fn far_triangle(&self, hit: &Hit, lanes: &mut TriangleLanes, i: usize) -> Option<(MaterialId, Option<LightId>)> {
+        let (mesh, triangle) = self.groups[0].triangle(hit.primitive);
+        Some(self.put(&FlatTriangle::of(&self.shapes, mesh, triangle)?, hit, lanes, i))
     }
 }
 
@@ -168,9 +182,9 @@ pub(super) struct FlatTriangle {
 
 impl FlatTriangle {
     /// So many are put together beforehand, which asks less of a hit: 0.98 of the time in the Cornell box. More would not stay in a cache.
-    const FEW: usize = 1 << 13;
+    const FEW: usize = 1 << 16;
 
-    #[inline]
+    #[inline(always)]
     fn of(shapes: &Shapes, mesh_index: u32, triangle: u32) -> Option<Self> {
         let mesh = &shapes.meshes[mesh_index as usize];
         if !(mesh.normals.is_empty() && mesh.tangents.is_empty() && mesh.uvs.is_empty()) {

@@ -1,8 +1,8 @@
 //! Light drawn towards many surfaces side by side, and the rays that ask for what is in the way.
 
 use super::{LightSample, LightTarget};
-use crate::geometry::{RayBatch, SurfaceLanes};
 use crate::geometry::segment;
+use crate::geometry::{RayBatch, SurfaceLanes};
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
 use irradiant_math::{Normal3, Point3, Vec3, offset_ray_origin};
 

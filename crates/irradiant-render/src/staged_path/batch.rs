@@ -14,7 +14,7 @@ use irradiant_core::light_sampler::{PickedLight, TreeLanes};
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
-use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
+use irradiant_math::{Normal3, Point2, Point3, Ray, offset_ray_origin};
 use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 
 /// How a path's vertex scatters.
@@ -153,7 +153,12 @@ pub(crate) struct Batch {
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
 
+    /// Paths whose surfaces are not plain flat triangles.
+    pub(super) uncommon: Vec<u32>,
+
     // Light of lamps that paths meet.
+    /// Lamps that are plain flat triangles: lane, light.
+    pub(super) flat_lamps: Vec<(u32, LightId)>,
     pub(super) lamps_met: Vec<MetLamp>,
 
     // Light samples.
@@ -245,6 +250,8 @@ impl Batch {
             any_gone: false,
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
+            uncommon: Vec::new(),
+            flat_lamps: Vec::new(),
             lamps_met: Vec::new(),
             seeking: Vec::new(),
             known_lamps: PlainLamp::all(scene),
@@ -288,12 +295,19 @@ impl Batch {
         self.d.copy(samples.len(), &begin.rays.d);
         self.time = begin.rays.time;
         self.streams.clone_from(begin.streams);
-        let mut n = 0;
-        for (s, sample) in samples.iter().enumerate() {
-            (self.met[s], self.sample[s]) = (begin.hits[s], s as u32);
-            if sample.camera_weight.is_some() {
-                self.shift(n, s);
-                n += 1;
+        let mut n = samples.len();
+        self.met[..n].copy_from_slice(begin.hits);
+        for s in 0..n {
+            self.sample[s] = s as u32;
+        }
+        // Cameras that see everything need no look at each sample.
+        if begin.rays.weight[..n].iter().any(|weight| *weight < 0.0) {
+            n = 0;
+            for (s, sample) in samples.iter().enumerate() {
+                if sample.camera_weight.is_some() {
+                    self.shift(n, s);
+                    n += 1;
+                }
             }
         }
         self.throughput.0.iter_mut().for_each(|lane| lane[..n].fill(1.0));
@@ -372,10 +386,39 @@ impl Batch {
     #[inline(always)]
     pub(super) fn plain(&mut self, scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> Plain {
         match self.known.get_mut(material.0 as usize) {
-            Some(known) if lambda.basis == Basis::Rgb => {
+            Some(known) if scene.basis() == Basis::Rgb => {
                 *known.get_or_insert_with(|| Plain::of(scene, material, lambda))
             }
             _ => Plain::of(scene, material, lambda),
+        }
+    }
+
+    /// Makes a lane's surface scatter as a material does that is the same everywhere. Whether it is.
+    #[inline(always)]
+    pub(super) fn set_plain(&mut self, i: usize, scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> bool {
+        // Not a copy of all that may be known.
+        let of_this;
+        let plain = match self.known.get_mut(material.0 as usize) {
+            Some(known) if scene.basis() == Basis::Rgb => {
+                &*known.get_or_insert_with(|| Plain::of(scene, material, lambda))
+            }
+            _ => {
+                of_this = Plain::of(scene, material, lambda);
+                &of_this
+            }
+        };
+        match plain {
+            Plain::Diffuse(reflectance) => {
+                let reflectance = *reflectance;
+                self.set_diffuse(i, reflectance);
+                true
+            }
+            Plain::Metal(metal) => {
+                let metal = *metal;
+                self.set_metal(i, metal);
+                true
+            }
+            Plain::Other => false,
         }
     }
 
@@ -427,19 +470,32 @@ impl Batch {
     #[inline(always)]
     pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
         self.reflectance.set(i, reflectance);
+        self.is_metal[i] = 0;
         (self.scattering[i], self.seeks[i]) = (Scattering::Diffuse, u32::from(!reflectance.is_black()));
     }
 
     pub fn set_alone(&mut self, i: usize, bsdf: Bsdf) {
         self.scattering[i] = Scattering::Alone(self.bsdfs.len() as u32);
+        self.is_metal[i] = 0;
         self.seeks[i] = u32::from(bsdf.flags().is_non_specular());
         self.bsdfs.push(bsdf);
         self.bsdf_lanes.push(i as u32);
     }
 
+    /// Nothing is known of the vertices that come next.
+    pub fn forget_vertices(&mut self) {
+        self.uncommon.clear();
+        self.flat_lamps.clear();
+        self.lamps_met.clear();
+        self.bsdfs.clear();
+        self.bsdf_lanes.clear();
+        self.any_gone = false;
+    }
+
     /// The path of a lane goes on elsewhere, or has ended.
     pub fn set_gone(&mut self, i: usize) {
         (self.scattering[i], self.seeks[i], self.any_gone) = (Scattering::Gone, 0, true);
+        self.is_metal[i] = 0;
     }
 
     /// All that lights look at.

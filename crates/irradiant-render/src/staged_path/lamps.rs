@@ -1,6 +1,6 @@
 //! Light of lamps: those that paths meet, and those that are sampled at vertices.
 
-use super::batch::{Batch, MetLamp, Scattering};
+use super::batch::{Batch, MetLamp};
 use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
