@@ -196,8 +196,10 @@ pub(crate) struct SampleBatch {
 
 impl SampleBatch {
     /// Of nothing yet.
-    pub fn new() -> Self {
-        Self {
+    // Apart, so that what is made on the stack first is gone from it afterwards.
+    #[inline(never)]
+    pub fn new() -> Box<Self> {
+        Box::new(Self {
             n: 0,
             pixels: [[0; 2]; LANES],
             indices: [0; LANES],
@@ -211,7 +213,7 @@ impl SampleBatch {
             seen: [SampledSpectrum::ZERO; LANES],
             rgb: Triples::ZERO,
             refused: Vec::new(),
-        }
+        })
     }
 
     /// As [`for_each_first_hit`], of estimators that take many samples at once: [`LANES`] at most, of streams that

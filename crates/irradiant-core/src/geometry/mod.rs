@@ -4,7 +4,7 @@
 //! In reading order: this file (what a ray may ask: [`Geometry`]); `compile` (from the description); `accel` (groups,
 //! trees, alpha); `instance` (groups placed elsewhere, moving or not); the shapes `triangle`, `bilinear`, `sphere`,
 //! `disk`, `cylinder`, `curve`; `placement` (quadrics' own spaces); [`emitter`] (shapes as sources of light); [`textbook`]
-//! (how not to do it, for teaching).
+//! (how not to do it, for teaching); `triangle_lanes` and `ray_batch` (many at once).
 //!
 //! # Robustness
 //! No epsilon is anyone's to choose. Hit points are put back on their surface (quadrics on the quadric in `f64`,

@@ -219,6 +219,8 @@ const NO_LAMP: u32 = u32::MAX;
 
 impl Batch {
     /// For paths of this scene.
+    // Apart, so that what is made on the stack first is gone from it afterwards.
+    #[inline(never)]
     pub fn new(scene: &Scene) -> Box<Self> {
         Box::new(Self {
             o: Triples::ZERO,
