@@ -42,5 +42,5 @@ pub use level::{Kernel, Level};
 pub use node::Bvh;
 pub use pages::vec_on_large_pages;
 pub use part::{Braid, Part, braid};
-pub use prefetch::prefetch_read;
+pub use prefetch::{prefetch_read, prefetch_whole};
 pub use ray::{Closest, Hit, Leaves, Ray, TrianglesOnly};

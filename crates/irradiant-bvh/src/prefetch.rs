@@ -9,6 +9,15 @@ pub fn prefetch_read<T: ?Sized>(value: &T) {
     lines::<1>(std::ptr::from_ref(value).cast());
 }
 
+/// As [`prefetch_read`], for the lines on which `value`, of at most 64 bytes, starts and ends.
+#[inline(always)]
+pub fn prefetch_whole<T>(value: &T) {
+    const { assert!(size_of::<T>() > 0 && size_of::<T>() <= 64) };
+    let start: *const u8 = std::ptr::from_ref(value).cast();
+    lines::<1>(start);
+    lines::<1>(start.wrapping_add(size_of::<T>() - 1));
+}
+
 /// Asks for `N` consecutive lines, the one at `start` first. `start` may be any address.
 #[inline(always)]
 #[allow(unsafe_code)]
@@ -35,6 +44,7 @@ mod tests {
         prefetch_read(&numbers[..]);
         prefetch_read::<[f32]>(&[]);
         prefetch_read(&());
+        numbers.iter().for_each(prefetch_whole);
         lines::<3>(std::ptr::null());
         lines::<3>(usize::MAX as *const u8);
         assert_eq!(numbers.iter().sum::<f32>(), 1000.0);

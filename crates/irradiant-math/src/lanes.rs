@@ -5,9 +5,10 @@
 
 use crate::vector::{Normal3, Point3, Vec3};
 
-/// How many there are at once: enough to share the cost of a stage, few enough that all numbers of all stages stay in the second-level
-/// cache. Not a power of two, or the arrays of a lane's numbers would compete for the same places of the first-level cache.
-pub const LANES: usize = 240;
+/// How many there are at once: enough that the last paths of a batch, which go on alone for long, fill vectors and share the cost of a stage; few enough
+/// that all numbers of all stages stay in the second-level cache. Not a power of two, or the arrays of a lane's numbers would compete for the same
+/// places of the first-level cache.
+pub const LANES: usize = 480;
 
 /// Loops run over a multiple of so many lanes, the last ones for nothing: a vector's worth, so that none is left over.
 pub const WHOLE: usize = 16;

@@ -4,7 +4,7 @@
 use crate::integrator::{RenderStats, WorkUnit};
 use irradiant_core::camera::{CameraLanes, CameraRay};
 use irradiant_core::film::FilmTile;
-use irradiant_core::geometry::{Hit, Kernel};
+use irradiant_core::geometry::{Hit, Kernel, RayBatch};
 use irradiant_core::sampler::{BlockLanes, CameraDraws, SampleStream, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE, whole};
@@ -187,8 +187,7 @@ pub(crate) struct SampleBatch {
     numbers: [BlockLanes; 2],
     filter_weights: Floats,
     camera: CameraLanes,
-    rays: Vec<Ray>,
-    ends: Vec<f32>,
+    rays: RayBatch,
     hits: [Option<Hit>; LANES],
     seen: [SampledSpectrum; LANES],
     rgb: Triples,
@@ -197,8 +196,10 @@ pub(crate) struct SampleBatch {
 
 impl SampleBatch {
     /// Of nothing yet.
-    pub fn new() -> Self {
-        Self {
+    // Apart, so that what is made on the stack first is gone from it afterwards.
+    #[inline(never)]
+    pub fn new() -> Box<Self> {
+        Box::new(Self {
             n: 0,
             pixels: [[0; 2]; LANES],
             indices: [0; LANES],
@@ -207,13 +208,12 @@ impl SampleBatch {
             numbers: [BlockLanes::ZERO; 2],
             filter_weights: [0.0; LANES],
             camera: CameraLanes::NONE,
-            rays: Vec::with_capacity(LANES),
-            ends: Vec::with_capacity(LANES),
+            rays: RayBatch::NONE,
             hits: [None; LANES],
             seen: [SampledSpectrum::ZERO; LANES],
             rgb: Triples::ZERO,
             refused: Vec::new(),
-        }
+        })
     }
 
     /// As [`for_each_first_hit`], of estimators that take many samples at once: [`LANES`] at most, of streams that
@@ -258,7 +258,7 @@ impl SampleBatch {
         radiance(&mut self.samples, begin, &mut self.seen[..n], stats);
         scene.geometry.level().run(AddToFilm { batch: self, scene, tile });
         stats.paths += n as u64;
-        stats.camera_rays += self.samples.iter().filter(|sample| sample.camera_weight.is_some()).count() as u64;
+        stats.camera_rays += self.camera.weight[..n].iter().filter(|weight| !(**weight < 0.0)).count() as u64;
         for i in self.refused.drain(..) {
             let BatchSample { pixel: [x, y], index, .. } = self.samples[i];
             stats.refuse(x, y, index);
@@ -281,7 +281,7 @@ impl SampleBatch {
     pub fn trace(&mut self, scene: &Scene, of_one_time: usize) {
         self.draw(scene, of_one_time);
         let hits = &mut self.hits[..self.rays.len()];
-        scene.geometry.intersect_batch(&self.rays, &self.ends, &scene.alpha(), hits);
+        scene.geometry.intersect_rays(&mut self.rays, false, &scene.alpha(), hits);
     }
 
     /// The samples that have been traced, and what they begin with.
@@ -295,11 +295,8 @@ impl SampleBatch {
         scene.geometry.level().run(DrawRays { batch: self, scene, of_one_time });
         let n = std::mem::take(&mut self.n);
         self.samples.clear();
-        self.rays.clear();
-        self.ends.clear();
         let (camera, [_, _, wavelength, _]) = (&self.camera, &self.numbers[0].0);
-        self.rays.extend((0..n).map(|i| camera.ray(i).0));
-        self.ends.extend((0..n).map(|i| camera.ray(i).1));
+        self.rays.take(n, &camera.o, &camera.d, &camera.time, |i| camera.end(i));
         self.samples.extend((0..n).map(|i| BatchSample {
             pixel: self.pixels[i],
             index: self.indices[i],

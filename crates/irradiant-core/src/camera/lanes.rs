@@ -2,8 +2,8 @@
 
 use super::projective::FlatScreen;
 use super::{Camera, Model};
+use irradiant_math::Point2;
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
-use irradiant_math::{Point2, Ray};
 
 /// Where samples are on the film and on the lens, and the rays that leave the camera there.
 #[derive(Clone, Debug)]
@@ -49,11 +49,10 @@ impl CameraLanes {
         Point2::new(self.lens[0][i], self.lens[1][i])
     }
 
-    /// The ray of a lane, and how far it goes: not at all where the camera sees nothing.
+    /// How far the ray of a lane goes: not at all where the camera sees nothing.
     #[inline(always)]
-    pub fn ray(&self, i: usize) -> (Ray, f32) {
-        let end = if self.weight[i] < 0.0 { 0.0 } else { f32::INFINITY };
-        (Ray::new(self.o.point(i), self.d.vector(i), self.time[i]), end)
+    pub fn end(&self, i: usize) -> f32 {
+        if self.weight[i] < 0.0 { 0.0 } else { f32::INFINITY }
     }
 
     /// The rays of `n` lanes through a screen that rests.
@@ -97,6 +96,7 @@ mod tests {
     use super::super::tests::{Setup, orthographic, perspective, realistic};
     use super::*;
     use crate::geometry::{Kernel, Level};
+    use irradiant_math::Ray;
     use irradiant_scene::desc::CameraKind;
     use irradiant_scene::desc::camera::ApertureShape;
     use irradiant_testkit::Rng;
@@ -139,10 +139,10 @@ mod tests {
                 level.run(Look(&camera, &mut lanes));
                 for i in 0..N {
                     let single = camera.generate_ray(lanes.film(i), lanes.lens(i), lanes.time_u[i]);
-                    let (ray, end) = lanes.ray(i);
-                    assert_eq!(end > 0.0, single.is_some(), "{level:?}");
+                    assert_eq!(lanes.end(i) > 0.0, single.is_some(), "{level:?}");
                     blind += usize::from(single.is_none());
                     let Some(single) = single else { continue };
+                    let ray = Ray::new(lanes.o.point(i), lanes.d.vector(i), lanes.time[i]);
                     assert_eq!((ray, lanes.weight[i]), (single.ray, single.weight), "{level:?}");
                 }
             }

@@ -111,7 +111,7 @@ impl MeshRanges {
     }
 
     /// The range that a triangle is in.
-    #[inline]
+    #[inline(always)]
     fn of(&self, triangle: u32) -> MeshRange {
         let entry = (triangle >> self.log2_stride) as usize;
         let low = self.guide[entry] as usize;

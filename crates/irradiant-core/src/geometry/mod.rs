@@ -4,7 +4,7 @@
 //! In reading order: this file (what a ray may ask: [`Geometry`]); `compile` (from the description); `accel` (groups,
 //! trees, alpha); `instance` (groups placed elsewhere, moving or not); the shapes `triangle`, `bilinear`, `sphere`,
 //! `disk`, `cylinder`, `curve`; `placement` (quadrics' own spaces); [`emitter`] (shapes as sources of light); [`textbook`]
-//! (how not to do it, for teaching).
+//! (how not to do it, for teaching); `triangle_lanes` and `ray_batch` (many at once).
 //!
 //! # Robustness
 //! No epsilon is anyone's to choose. Hit points are put back on their surface (quadrics on the quadric in `f64`,
@@ -23,6 +23,7 @@ mod disk;
 pub mod emitter;
 mod instance;
 mod placement;
+mod ray_batch;
 mod spawn;
 mod sphere;
 #[cfg(test)]
@@ -36,6 +37,7 @@ pub use compile::compile_geometry;
 pub use emitter::{EmitterShape, NormalCone, RectangleLanes, ShapeSample, SphereLanes};
 
 pub use irradiant_bvh::{Kernel, Level};
+pub use ray_batch::RayBatch;
 pub(crate) use spawn::segment;
 pub use triangle_lanes::{SurfaceLanes, TriangleLanes};
 
@@ -181,24 +183,6 @@ impl Geometry {
             self.closest_of_batch::<SORTED_BATCH>(rays, t_max, alpha, hits);
         } else {
             self.closest_of_batch::<BATCH>(rays, t_max, alpha, hits);
-        }
-    }
-
-    /// The same for rays that go anywhere (bounces), `t_max` being infinite: together only where that pays.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn intersect_scattered(&self, rays: &[Ray], alpha: &impl AlphaTextures, hits: &mut [Option<Hit>]) {
-        assert_eq!(rays.len(), hits.len(), "one answer for each ray");
-        if self.sorts_rays() {
-            let ends = [f32::INFINITY; SORTED_BATCH];
-            for (rays, hits) in rays.chunks(SORTED_BATCH).zip(hits.chunks_mut(SORTED_BATCH)) {
-                self.closest_of_batch::<SORTED_BATCH>(rays, &ends[..rays.len()], alpha, hits);
-            }
-        } else {
-            for (ray, hit) in rays.iter().zip(hits) {
-                *hit = self.intersect(ray, f32::INFINITY, alpha);
-            }
         }
     }
 

@@ -1,10 +1,10 @@
 //! Light drawn towards many surfaces side by side, and the rays that ask for what is in the way.
 
 use super::{LightSample, LightTarget};
-use crate::geometry::SurfaceLanes;
 use crate::geometry::segment;
+use crate::geometry::{RayBatch, SurfaceLanes};
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
-use irradiant_math::{Normal3, Point3, Ray, Vec3, offset_ray_origin};
+use irradiant_math::{Normal3, Point3, Vec3, offset_ray_origin};
 
 /// Where the light of each lane comes from, and the segment or ray there.
 #[derive(Clone, Debug)]
@@ -64,10 +64,10 @@ impl TargetLanes {
         }
     }
 
-    /// The ray of a lane, and how far it goes.
+    /// Adds the ray of a lane.
     #[inline(always)]
-    pub fn ray(&self, i: usize, time: f32) -> (Ray, f32) {
+    pub fn put_ray(&self, i: usize, time: f32, rays: &mut RayBatch) {
         let end = if self.is_infinite[i] != 0 { f32::INFINITY } else { 1.0 };
-        (Ray::new(self.o.point(i), self.d.vector(i), time), end)
+        rays.push(self.o.point(i), self.d.vector(i), end, time);
     }
 }

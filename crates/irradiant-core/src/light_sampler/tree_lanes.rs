@@ -144,19 +144,16 @@ impl TreeSampler {
             let mut stay = 0;
             for k in 0..n {
                 let (i, child) = (walks.lane[k] as usize, walks.child[k]);
-                if child == NOWHERE {
-                    continue;
-                }
-                let child = self.nodes[walks.node[k] as usize].children[child as usize];
-                if child & LEAF != 0 {
-                    if walks.pmf[k] > 0.0 {
-                        (id[i], pmf[i]) = (child & !LEAF, walks.pmf[k]);
-                    }
-                    continue;
-                }
+                // Chosen without branches, which would be guessed wrong often.
+                let is_somewhere = child != NOWHERE;
+                let child = self.nodes[walks.node[k] as usize].children[if is_somewhere { child as usize } else { 0 }];
+                let is_leaf = child & LEAF != 0;
+                let arrives = is_somewhere & is_leaf & (walks.pmf[k] > 0.0);
+                id[i] = if arrives { child & !LEAF } else { id[i] };
+                pmf[i] = if arrives { walks.pmf[k] } else { pmf[i] };
                 (walks.lane[stay], walks.node[stay]) = (walks.lane[k], child);
                 (walks.u[stay], walks.pmf[stay]) = (walks.u[k], walks.pmf[k]);
-                stay += 1;
+                stay += usize::from(is_somewhere & !is_leaf);
             }
             n = stay;
         }

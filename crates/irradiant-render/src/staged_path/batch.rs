@@ -6,7 +6,7 @@ use crate::camera_samples::{BatchSample, Beginnings};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
-use irradiant_core::geometry::{Hit, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
+use irradiant_core::geometry::{Hit, RayBatch, RectangleLanes, SphereLanes, SurfaceLanes, TriangleLanes};
 use irradiant_core::interaction::ReferencePoint;
 use irradiant_core::interaction::{Interaction, LightId, MaterialId, TextureContext};
 use irradiant_core::light::{ImageInfiniteLight, SkyLanes, SkyPoint, TargetLanes};
@@ -14,7 +14,7 @@ use irradiant_core::light_sampler::{PickedLight, TreeLanes};
 use irradiant_core::sampler::{BlockLanes, StreamLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::lanes::{Floats, LANES, Triples, WHOLE};
-use irradiant_math::{Normal3, Point2, Point3, Ray, Vec3, offset_ray_origin};
+use irradiant_math::{Normal3, Point2, Point3, Ray, offset_ray_origin};
 use irradiant_spectrum::{Basis, N_WAVELENGTHS, SampledSpectrum, Wavelengths};
 
 /// How a path's vertex scatters.
@@ -125,8 +125,6 @@ pub(crate) struct Batch {
     pub(super) light_splits: u32,
     pub(super) throughput: SpectrumLanes,
     pub(super) roulette_scale: Floats,
-    /// Rays to the next vertices.
-    pub(super) rays: [Ray; LANES],
     pub(super) met: [Option<Hit>; LANES],
     pub(super) escape_place: [Option<Point2>; LANES],
     /// Which of the batch's samples.
@@ -145,11 +143,22 @@ pub(crate) struct Batch {
     pub(super) k: SpectrumLanes,
     pub(super) is_metal: [u32; LANES],
     pub(super) alphas: [Floats; 2],
+    /// Models of their own, and whose they are.
     pub(super) bsdfs: Vec<Bsdf>,
+    pub(super) bsdf_lanes: Vec<u32>,
+    /// 1 where light scatters that it is not known where to look for.
+    pub(super) seeks: [u32; LANES],
+    /// Whether any path has gone since the vertices were met.
+    pub(super) any_gone: bool,
     pub(super) light: BlockLanes,
     pub(super) scatter: BlockLanes,
 
+    /// Paths whose surfaces are not plain flat triangles.
+    pub(super) uncommon: Vec<u32>,
+
     // Light of lamps that paths meet.
+    /// Lamps that are plain flat triangles: lane, light.
+    pub(super) flat_lamps: Vec<(u32, LightId)>,
     pub(super) lamps_met: Vec<MetLamp>,
 
     // Light samples.
@@ -188,10 +197,10 @@ pub(crate) struct Batch {
     /// The sky, while vertices share it, and their samples of it: lane, point, share of all samples, chance.
     pub(super) shared_sky: Option<LightId>,
     pub(super) sky_samples: Vec<(u32, SkyPoint, f32, f32)>,
-    pub(super) shadow_rays: Vec<Ray>,
-    pub(super) shadow_ends: Vec<f32>,
-    /// The sample that each would bring this to.
-    pub(super) shadow_light: Vec<(u32, SampledSpectrum)>,
+    /// Paths that ask what is in the way of their light.
+    pub(super) asking: [u32; LANES],
+    /// Their rays to the light, or all paths' rays to the next vertices.
+    pub(super) rays: RayBatch,
 
     // Directions of diffuse surfaces and metals.
     pub(super) next_o: Triples,
@@ -210,6 +219,8 @@ const NO_LAMP: u32 = u32::MAX;
 
 impl Batch {
     /// For paths of this scene.
+    // Apart, so that what is made on the stack first is gone from it afterwards.
+    #[inline(never)]
     pub fn new(scene: &Scene) -> Box<Self> {
         Box::new(Self {
             o: Triples::ZERO,
@@ -222,7 +233,6 @@ impl Batch {
             light_splits: 1,
             throughput: SpectrumLanes::ZERO,
             roulette_scale: [0.0; LANES],
-            rays: [Ray::new(Point3::ZERO, Vec3::Z, 0.0); LANES],
             met: [None; LANES],
             escape_place: [None; LANES],
             sample: [0; LANES],
@@ -237,8 +247,13 @@ impl Batch {
             is_metal: [0; LANES],
             alphas: [[1.0; LANES]; 2],
             bsdfs: Vec::new(),
+            bsdf_lanes: Vec::new(),
+            seeks: [0; LANES],
+            any_gone: false,
             light: BlockLanes::ZERO,
             scatter: BlockLanes::ZERO,
+            uncommon: Vec::new(),
+            flat_lamps: Vec::new(),
             lamps_met: Vec::new(),
             seeking: Vec::new(),
             known_lamps: PlainLamp::all(scene),
@@ -264,9 +279,8 @@ impl Batch {
             light_pick: [0.0; LANES],
             shared_sky: None,
             sky_samples: Vec::new(),
-            shadow_rays: Vec::new(),
-            shadow_ends: Vec::new(),
-            shadow_light: Vec::new(),
+            asking: [0; LANES],
+            rays: RayBatch::NONE,
             next_o: Triples::ZERO,
             next_d: Triples::ZERO,
             next_pdf: [0.0; LANES],
@@ -283,12 +297,19 @@ impl Batch {
         self.d.copy(samples.len(), &begin.rays.d);
         self.time = begin.rays.time;
         self.streams.clone_from(begin.streams);
-        let mut n = 0;
-        for (s, sample) in samples.iter().enumerate() {
-            (self.met[s], self.sample[s]) = (begin.hits[s], s as u32);
-            if sample.camera_weight.is_some() {
-                self.shift(n, s);
-                n += 1;
+        let mut n = samples.len();
+        self.met[..n].copy_from_slice(begin.hits);
+        for s in 0..n {
+            self.sample[s] = s as u32;
+        }
+        // Cameras that see everything need no look at each sample.
+        if begin.rays.weight[..n].iter().any(|weight| *weight < 0.0) {
+            n = 0;
+            for (s, sample) in samples.iter().enumerate() {
+                if sample.camera_weight.is_some() {
+                    self.shift(n, s);
+                    n += 1;
+                }
             }
         }
         self.throughput.0.iter_mut().for_each(|lane| lane[..n].fill(1.0));
@@ -367,10 +388,39 @@ impl Batch {
     #[inline(always)]
     pub(super) fn plain(&mut self, scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> Plain {
         match self.known.get_mut(material.0 as usize) {
-            Some(known) if lambda.basis == Basis::Rgb => {
+            Some(known) if scene.basis() == Basis::Rgb => {
                 *known.get_or_insert_with(|| Plain::of(scene, material, lambda))
             }
             _ => Plain::of(scene, material, lambda),
+        }
+    }
+
+    /// Makes a lane's surface scatter as a material does that is the same everywhere. Whether it is.
+    #[inline(always)]
+    pub(super) fn set_plain(&mut self, i: usize, scene: &Scene, material: MaterialId, lambda: &Wavelengths) -> bool {
+        // Not a copy of all that may be known.
+        let of_this;
+        let plain = match self.known.get_mut(material.0 as usize) {
+            Some(known) if scene.basis() == Basis::Rgb => {
+                &*known.get_or_insert_with(|| Plain::of(scene, material, lambda))
+            }
+            _ => {
+                of_this = Plain::of(scene, material, lambda);
+                &of_this
+            }
+        };
+        match plain {
+            Plain::Diffuse(reflectance) => {
+                let reflectance = *reflectance;
+                self.set_diffuse(i, reflectance);
+                true
+            }
+            Plain::Metal(metal) => {
+                let metal = *metal;
+                self.set_metal(i, metal);
+                true
+            }
+            Plain::Other => false,
         }
     }
 
@@ -416,18 +466,38 @@ impl Batch {
         self.eta.set(i, eta);
         self.k.set(i, k);
         (self.is_metal[i], self.alphas[0][i], self.alphas[1][i]) = (1, x, y);
-        self.scattering[i] = Scattering::Metal;
+        (self.scattering[i], self.seeks[i]) = (Scattering::Metal, 1);
     }
 
     #[inline(always)]
     pub fn set_diffuse(&mut self, i: usize, reflectance: SampledSpectrum) {
         self.reflectance.set(i, reflectance);
-        self.scattering[i] = Scattering::Diffuse;
+        self.is_metal[i] = 0;
+        (self.scattering[i], self.seeks[i]) = (Scattering::Diffuse, u32::from(!reflectance.is_black()));
     }
 
     pub fn set_alone(&mut self, i: usize, bsdf: Bsdf) {
         self.scattering[i] = Scattering::Alone(self.bsdfs.len() as u32);
+        self.is_metal[i] = 0;
+        self.seeks[i] = u32::from(bsdf.flags().is_non_specular());
         self.bsdfs.push(bsdf);
+        self.bsdf_lanes.push(i as u32);
+    }
+
+    /// Nothing is known of the vertices that come next.
+    pub fn forget_vertices(&mut self) {
+        self.uncommon.clear();
+        self.flat_lamps.clear();
+        self.lamps_met.clear();
+        self.bsdfs.clear();
+        self.bsdf_lanes.clear();
+        self.any_gone = false;
+    }
+
+    /// The path of a lane goes on elsewhere, or has ended.
+    pub fn set_gone(&mut self, i: usize) {
+        (self.scattering[i], self.seeks[i], self.any_gone) = (Scattering::Gone, 0, true);
+        self.is_metal[i] = 0;
     }
 
     /// All that lights look at.
@@ -466,11 +536,13 @@ impl Batch {
         level.run(Scatter(self, n));
         self.next_scale[..n].fill(1.0);
         self.specular[..n].fill(false);
-        for i in 0..n {
-            match self.scattering[i] {
-                Scattering::Diffuse | Scattering::Metal => {}
-                Scattering::Alone(k) => self.goes_on[i] = u32::from(self.scatter_alone(i, k as usize)),
-                Scattering::Gone => self.goes_on[i] = 0,
+        for k in 0..self.bsdfs.len() {
+            let i = self.bsdf_lanes[k] as usize;
+            self.goes_on[i] = u32::from(self.scatter_alone(i, k));
+        }
+        if self.any_gone {
+            for i in 0..n {
+                self.goes_on[i] = if self.scattering[i] == Scattering::Gone { 0 } else { self.goes_on[i] };
             }
         }
         if let Some((_, sky)) = scene.lights.sky() {
@@ -548,9 +620,7 @@ impl Batch {
                 self.shift(i, n);
             }
         }
-        for i in 0..n {
-            self.rays[i] = self.ray(i);
-        }
+        self.rays.take(n, &self.o, &self.d, &self.time, |_| f32::INFINITY);
         n
     }
 }

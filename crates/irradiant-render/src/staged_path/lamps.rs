@@ -1,6 +1,6 @@
 //! Light of lamps: those that paths meet, and those that are sampled at vertices.
 
-use super::batch::{Batch, MetLamp, Scattering};
+use super::batch::{Batch, MetLamp};
 use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
@@ -14,7 +14,6 @@ use irradiant_core::light::{AreaAlpha, AreaRadiance, Light, LightHit, SampleMode
 use irradiant_core::light_sampler::{LightSampler, PointLanes};
 use irradiant_core::scene::Scene;
 use irradiant_math::Point2;
-use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{Basis, SampledSpectrum, Wavelengths};
 
 /// All of [`Compensated`](SampleMode::Compensated): hits are weighed against samples.
@@ -168,19 +167,15 @@ impl Batch {
 
     /// Paths whose surfaces scatter light that it is not known where to look for; no light is picked yet.
     pub(super) fn seek_light(&mut self, n: usize) {
-        self.seeking.clear();
+        self.pmf[..n].fill(0.0);
+        self.seeking.resize(n, 0);
+        // Put down in any case, and kept where it counts: a branch would be guessed wrong often.
+        let mut k = 0;
         for i in 0..n {
-            self.pmf[i] = 0.0;
-            let scatters = match self.scattering[i] {
-                Scattering::Diffuse => !self.reflectance.at(i).is_black(),
-                Scattering::Metal => true,
-                Scattering::Alone(k) => self.bsdfs[k as usize].flags().is_non_specular(),
-                Scattering::Gone => false,
-            };
-            if scatters {
-                self.seeking.push(i as u32);
-            }
+            self.seeking[k] = i as u32;
+            k += self.seeks[i] as usize;
         }
+        self.seeking.truncate(k);
     }
 
     /// Has the shape of a plain lamp in the lanes of its kind. Whether there are lanes for it.
@@ -344,39 +339,32 @@ impl Batch {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        self.shadow_rays.clear();
-        self.shadow_ends.clear();
-        self.shadow_light.clear();
-        for i in 0..n {
-            // Not a comparison that NaN fails: what is wrong must reach the film, which counts it.
-            if self.pmf[i] == 0.0 || self.targets.pdf[i] == 0.0 {
-                continue;
+        for k in 0..self.bsdfs.len() {
+            let i = self.bsdf_lanes[k] as usize;
+            let (bsdf, wi) = (&self.bsdfs[k], self.targets.wi.vector(i));
+            if self.pmf[i] != 0.0 {
+                let (f, pdf) = bsdf.f_and_pdf(self.at.wo.vector(i), wi, TransportMode::Radiance);
+                let (light, counts) = self.bring(i, f * wi.dot(bsdf.frame.z).abs(), pdf);
+                self.brought.set(i, light);
+                self.brings[i] = u32::from(counts);
             }
-            let (light, counts) = match self.scattering[i] {
-                Scattering::Diffuse | Scattering::Metal => (self.brought.at(i), self.brings[i] != 0),
-                Scattering::Alone(k) => {
-                    let (bsdf, wi) = (&self.bsdfs[k as usize], self.targets.wi.vector(i));
-                    let (f, pdf) = bsdf.f_and_pdf(self.at.wo.vector(i), wi, TransportMode::Radiance);
-                    self.bring(i, f * wi.dot(bsdf.frame.z).abs(), pdf)
-                }
-                Scattering::Gone => continue,
-            };
-            if !counts {
-                continue;
-            }
-            let (ray, end) = self.targets.ray(i, self.time[i]);
-            self.shadow_rays.push(ray);
-            self.shadow_ends.push(end);
-            self.shadow_light.push((self.sample[i], light));
         }
-        stats.shadow_rays += self.shadow_rays.len() as u64;
-        let mut occluded = [false; LANES];
-        let occluded = &mut occluded[..self.shadow_rays.len()];
-        scene.geometry.occluded_batch(&self.shadow_rays, &self.shadow_ends, &scene.alpha(), occluded);
-        for (&(s, light), occluded) in self.shadow_light.iter().zip(occluded) {
-            if !*occluded {
-                radiance[s as usize] += light;
-            }
+        // Put down in any case, and kept where it counts: a branch would be guessed wrong often. No path that has gone has a light.
+        let mut asking = 0;
+        for i in 0..n {
+            self.asking[asking] = i as u32;
+            // Not comparisons that NaN fails: what is wrong must reach the film, which counts it.
+            asking += usize::from((self.brings[i] != 0) & (self.pmf[i] != 0.0) & (self.targets.pdf[i] != 0.0));
+        }
+        self.rays.clear();
+        for &i in &self.asking[..asking] {
+            self.targets.put_ray(i as usize, self.time[i as usize], &mut self.rays);
+        }
+        stats.shadow_rays += asking as u64;
+        scene.geometry.occluded_rays(&mut self.rays, &scene.alpha());
+        for (k, &i) in self.asking[..asking].iter().enumerate() {
+            let (light, s) = (self.brought.at(i as usize), self.sample[i as usize] as usize);
+            radiance[s] += if self.rays.is_blocked(k) { SampledSpectrum::ZERO } else { light };
         }
     }
 }

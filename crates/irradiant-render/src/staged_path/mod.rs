@@ -24,15 +24,17 @@ use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
 use crate::path::{PathIntegrator, Walk};
 use crate::record::NoRecord;
-use batch::{Scattering, Surface, nowhere};
+use batch::{Surface, nowhere};
 use irradiant_core::bxdf::Bxdf;
 use irradiant_core::interaction::Interaction;
 use irradiant_core::sampler::StreamLanes;
 use irradiant_core::scene::Scene;
 use irradiant_math::Frame;
-use irradiant_math::lanes::LANES;
 use irradiant_spectrum::{Basis, SampledSpectrum};
 use kernels::{Surfaces, Survive};
+
+/// How many hits further on memory is asked for.
+const AHEAD: usize = 8;
 
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
@@ -98,12 +100,13 @@ impl PathIntegrator {
         if n_flat > 0 {
             scene.geometry.level().run(Surfaces(b, n));
         }
-        self.shade(b, n, depth, scene, samples, radiance, stats);
+        self.shade(b, depth, scene, samples, radiance, stats);
         b.light_of_lamps(depth, scene, radiance);
         n
     }
 
-    /// Ends the paths that leave the scene. How many stay, and how many of them meet flat triangles.
+    /// Ends the paths that leave the scene, and finds out how light scatters at plain flat triangles. How many stay, and how many of them meet flat
+    /// triangles.
     fn arrive(
         &self,
         b: &mut Batch,
@@ -113,10 +116,11 @@ impl PathIntegrator {
         samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
     ) -> (usize, usize) {
+        b.forget_vertices();
         let sees_light = !scene.lights.environments().is_empty();
         let (mut i, mut n_flat) = (0, 0);
         while i < n {
-            if let Some(Some(hit)) = b.met.get(i + 8) {
+            if let Some(Some(hit)) = b.met.get(i + AHEAD) {
                 scene.geometry.prefetch_flat_triangle(hit);
             }
             let Some(hit) = &b.met[i] else {
@@ -130,57 +134,53 @@ impl PathIntegrator {
                 continue;
             };
             let flat = scene.geometry.flat_triangle(hit, &mut b.triangles, i);
-            n_flat += usize::from(flat.is_some());
-            b.surface[i] = flat.map_or(Surface::Other, |(material, light)| Surface::Flat(material, light));
+            if let Some((material, light)) = flat {
+                n_flat += 1;
+                b.surface[i] = Surface::Flat(material, light);
+                if b.set_plain(i, scene, material, &samples[b.sample[i] as usize].lambda) {
+                    b.flat_lamps.extend(light.map(|light| (i as u32, light)));
+                } else {
+                    b.uncommon.push(i as u32);
+                }
+            } else {
+                b.surface[i] = Surface::Other;
+                b.uncommon.push(i as u32);
+            }
             i += 1;
         }
         (n, n_flat)
     }
 
-    /// How light scatters where paths are, and what is emitted there.
+    /// How light scatters where paths are and it is not known yet, and what is emitted there.
     fn shade(
         &self,
         b: &mut Batch,
-        n: usize,
         depth: u32,
         scene: &Scene,
         samples: &mut [BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        b.bsdfs.clear();
-        b.lamps_met.clear();
-        for i in 0..n {
+        for k in 0..b.flat_lamps.len() {
+            let (i, light) = b.flat_lamps[k];
+            let (i, s) = (i as usize, b.sample[i as usize] as usize);
+            b.meet_lamp(i, scene, light, b.triangles.uv(i), &samples[s].lambda);
+        }
+        for k in 0..b.uncommon.len() {
+            let i = b.uncommon[k] as usize;
             let s = b.sample[i] as usize;
-            b.is_metal[i] = 0;
-            let is_known = match b.surface[i] {
-                Surface::Flat(material, light) => {
-                    let lambda = samples[s].lambda;
-                    let is_known = match b.plain(scene, material, &lambda) {
-                        Plain::Diffuse(reflectance) => {
-                            b.set_diffuse(i, reflectance);
-                            true
-                        }
-                        Plain::Metal(metal) => {
-                            b.set_metal(i, metal);
-                            true
-                        }
-                        Plain::Other => {
-                            let (frame, textures, after) = (b.at.frame(i), &scene.textures, &mut samples[s].lambda);
-                            let bsdf = scene.materials.plain_bsdf(material, frame, textures, &nowhere(), after);
-                            bsdf.map(|bsdf| b.set_alone(i, bsdf)).is_some()
-                        }
-                    };
-                    if let (true, Some(light)) = (is_known, light) {
+            if let Surface::Flat(material, light) = b.surface[i] {
+                let lambda = samples[s].lambda;
+                let (frame, textures, after) = (b.at.frame(i), &scene.textures, &mut samples[s].lambda);
+                if let Some(bsdf) = scene.materials.plain_bsdf(material, frame, textures, &nowhere(), after) {
+                    b.set_alone(i, bsdf);
+                    if let Some(light) = light {
                         b.meet_lamp(i, scene, light, b.triangles.uv(i), &lambda);
                     }
-                    is_known
+                    continue;
                 }
-                Surface::Other => false,
-            };
-            if !is_known {
-                self.shade_alone(b, i, depth, scene, &mut samples[s], &mut radiance[s], stats);
             }
+            self.shade_alone(b, i, depth, scene, &mut samples[s], &mut radiance[s], stats);
         }
     }
 
@@ -202,37 +202,29 @@ impl PathIntegrator {
         scene.geometry.fill_in_plainly(&ray, &hit, &mut at, |material, light| {
             b.is_plain_lamp(light) && !matches!(b.plain(scene, material, &lambda), Plain::Other)
         });
-        let frame = match b.plain(scene, at.material, &lambda) {
-            Plain::Diffuse(reflectance) => {
-                b.set_diffuse(i, reflectance);
-                Frame::from_z_near_x(at.ns.as_vec(), at.dpdus)
+        let frame = if b.set_plain(i, scene, at.material, &lambda) {
+            Frame::from_z_near_x(at.ns.as_vec(), at.dpdus)
+        } else {
+            let sees_texture = depth == 0 && scene.materials.is_textured(at.material);
+            let camera_ray = if sees_texture { sample.camera_ray(scene) } else { None };
+            let footprint = scene.texture_context(&at, camera_ray.as_ref());
+            let stream = sample.stream(scene);
+            let (mix, mut after) = (stream.mix(depth), lambda);
+            let bsdf = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, &mut after, mix);
+            let Some(bsdf) = bsdf else {
+                // An interface: the path would come to its next vertex one step after the others.
+                b.set_gone(i);
+                let mut walk = b.walk(i, depth);
+                self.go_alone(&mut walk, radiance, scene, sample, stats);
+                return;
+            };
+            sample.lambda = after;
+            match bsdf.bxdf {
+                Bxdf::Diffuse(diffuse) => b.set_diffuse(i, diffuse.reflectance),
+                Bxdf::Conductor(metal) if !metal.facets().is_smooth() => b.set_metal(i, metal),
+                _ => b.set_alone(i, bsdf),
             }
-            Plain::Metal(metal) => {
-                b.set_metal(i, metal);
-                Frame::from_z_near_x(at.ns.as_vec(), at.dpdus)
-            }
-            Plain::Other => {
-                let sees_texture = depth == 0 && scene.materials.is_textured(at.material);
-                let camera_ray = if sees_texture { sample.camera_ray(scene) } else { None };
-                let footprint = scene.texture_context(&at, camera_ray.as_ref());
-                let stream = sample.stream(scene);
-                let (mix, mut after) = (stream.mix(depth), lambda);
-                let bsdf = scene.materials.bsdf(at.material, &scene.textures, &at, &footprint, &mut after, mix);
-                let Some(bsdf) = bsdf else {
-                    // An interface: the path would come to its next vertex one step after the others.
-                    b.scattering[i] = Scattering::Gone;
-                    let mut walk = b.walk(i, depth);
-                    self.go_alone(&mut walk, radiance, scene, sample, stats);
-                    return;
-                };
-                sample.lambda = after;
-                match bsdf.bxdf {
-                    Bxdf::Diffuse(diffuse) => b.set_diffuse(i, diffuse.reflectance),
-                    Bxdf::Conductor(metal) if !metal.facets().is_smooth() => b.set_metal(i, metal),
-                    _ => b.set_alone(i, bsdf),
-                }
-                bsdf.frame
-            }
+            bsdf.frame
         };
         b.at.set(i, &at, &frame);
         if let Some(light) = at.light {
@@ -265,7 +257,7 @@ impl PathIntegrator {
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, n, scene);
         }
-        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         n
     }
 }
@@ -278,10 +270,12 @@ fn only_the_sky_counts(scene: &Scene) -> bool {
 
 /// Ends the paths whose rays meet anything. How many leave the scene.
 fn those_that_escape(b: &mut Batch, n: usize, scene: &Scene) -> usize {
-    let (ends, mut blocked) = ([f32::INFINITY; LANES], [false; LANES]);
-    scene.geometry.occluded_batch(&b.rays[..n], &ends[..n], &scene.alpha(), &mut blocked[..n]);
+    scene.geometry.occluded_rays(&mut b.rays, &scene.alpha());
     let mut escaping = 0;
-    for i in (0..n).filter(|&i| !blocked[i]) {
+    for i in 0..n {
+        if b.rays.is_blocked(i) {
+            continue;
+        }
         b.shift(escaping, i);
         b.met[escaping] = None;
         escaping += 1;

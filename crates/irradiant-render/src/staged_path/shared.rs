@@ -13,7 +13,6 @@ use irradiant_core::interaction::LightId;
 use irradiant_core::light::SkyPoint;
 use irradiant_core::scene::Scene;
 use irradiant_math::Vec3;
-use irradiant_math::lanes::LANES;
 use irradiant_spectrum::SampledSpectrum;
 
 impl Batch {
@@ -192,7 +191,7 @@ impl PathIntegrator {
         });
         let n = b.leave(n, scene);
         b.light_splits = self.light_splits_at(0);
-        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         match sky {
             Some(sky) => b.look_at_sky(n, sky, blocks),
             None => n,
@@ -210,7 +209,7 @@ impl PathIntegrator {
             if !b.is_shared(i) {
                 blocks.kinds[s] = Kind::Own;
                 if carried.is_black() {
-                    b.scattering[i] = Scattering::Gone;
+                    b.set_gone(i);
                 }
                 continue;
             }
@@ -247,8 +246,7 @@ impl PathIntegrator {
         if !b.sample_picked(n, 1, scene, samples, &mut blocks.rest, stats) {
             return;
         }
-        b.shadow_rays.clear();
-        b.shadow_ends.clear();
+        b.rays.clear();
         let begin = blocks.incoming.len();
         for i in 0..n {
             let s = b.sample[i];
@@ -259,9 +257,7 @@ impl PathIntegrator {
             if pmf == 0.0 || b.targets.pdf[i] == 0.0 || b.arriving.at(i).is_black() {
                 continue;
             }
-            let (ray, end) = b.targets.ray(i, b.time[i]);
-            b.shadow_rays.push(ray);
-            b.shadow_ends.push(end);
+            b.targets.put_ray(i, b.time[i], &mut b.rays);
             let incoming = Incoming {
                 wi: b.targets.wi.vector(i),
                 radiance: b.arriving.at(i),
@@ -270,13 +266,11 @@ impl PathIntegrator {
             };
             blocks.incoming.push((s, incoming));
         }
-        stats.shadow_rays += b.shadow_rays.len() as u64;
-        let mut occluded = [false; LANES];
-        let occluded = &mut occluded[..b.shadow_rays.len()];
-        scene.geometry.occluded_batch(&b.shadow_rays, &b.shadow_ends, &scene.alpha(), occluded);
+        stats.shadow_rays += b.rays.len() as u64;
+        scene.geometry.occluded_rays(&mut b.rays, &scene.alpha());
         let mut stay = begin;
-        for (k, occluded) in occluded.iter().enumerate() {
-            if !*occluded {
+        for k in 0..b.rays.len() {
+            if !b.rays.is_blocked(k) {
                 blocks.incoming.swap(stay, begin + k);
                 stay += 1;
             }
@@ -326,7 +320,7 @@ impl PathIntegrator {
         });
         let n = b.leave(n, scene);
         b.light_splits = 1;
-        scene.geometry.intersect_scattered(&b.rays[..n], &scene.alpha(), &mut b.met[..n]);
+        scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         for i in 0..n {
             let s = b.sample[i] as usize;
             if blocks.kinds[s] == Kind::By {

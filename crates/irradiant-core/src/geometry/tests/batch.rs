@@ -72,7 +72,7 @@ fn batches_meet_what_single_rays_meet() {
     let textures = Checks::default();
     for level in Level::available() {
         g.set_level(level);
-        let mut rng = Rng::new(31);
+        let (mut rng, mut kept) = (Rng::new(31), Box::new(RayBatch::NONE));
         let (mut hits, mut blocked, mut instanced) = (0, 0, 0);
         for i in 0..600 {
             let n = [0, 1, 3, 8, 16, 64, 65, 150][i % 8];
@@ -81,6 +81,16 @@ fn batches_meet_what_single_rays_meet() {
             let mut occluded = vec![false; n];
             g.intersect_batch(&rays, &t_max, &textures, &mut closest);
             g.occluded_batch(&rays, &t_max, &textures, &mut occluded);
+            // In memory that is kept, the same.
+            kept.clear();
+            rays.iter().zip(&t_max).for_each(|(ray, end)| kept.push(ray.o, ray.d, *end, ray.time));
+            for scattered in [false, true] {
+                let mut found = vec![None; n];
+                g.intersect_rays(&mut kept, scattered, &textures, &mut found);
+                assert_eq!(found, closest, "{level:?}, batch {i}");
+            }
+            g.occluded_rays(&mut kept, &textures);
+            assert!((0..n).all(|k| kept.is_blocked(k) == occluded[k]), "{level:?}, batch {i}");
             for k in 0..n {
                 let expected = g.intersect(&rays[k], t_max[k], &textures);
                 assert_eq!(closest[k], expected, "{level:?}, batch {i}, ray {k}: {:?}", rays[k]);
