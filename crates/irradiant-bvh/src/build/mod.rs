@@ -222,6 +222,26 @@ mod tests {
     }
 
     #[test]
+    fn fewer_triangles_are_in_later_slots() {
+        let (positions, triangles) = scattered(20_000);
+        let bvh = build(&positions, &triangles, &[]);
+        // Triangles below a child; children of a node have higher indices than it.
+        let in_leaf = |first: usize| {
+            let last = (first..).find(|&b| bvh.blocks[b].is_last()).expect("leaves end");
+            bvh.blocks[first..=last].iter().map(Block::count).sum::<usize>()
+        };
+        let mut below = vec![0; bvh.nodes.len()];
+        for (i, node) in bvh.nodes.iter().enumerate().rev() {
+            let children = (0..8).filter(|&c| !node.is_unused(c)).map(|c| node.children[c]);
+            let counts: Vec<_> =
+                children.map(|c| if c.is_leaf() { in_leaf(c.index()) } else { below[c.index()] }).collect();
+            assert!(counts.is_sorted_by(|a, b| a >= b), "node {i}: {counts:?}");
+            below[i] = counts.iter().sum();
+        }
+        assert_eq!(below[0], bvh.report().triangles);
+    }
+
+    #[test]
     fn a_million_triangles_would_fit_the_memory_promised() {
         let (positions, triangles) = scattered(100_000);
         let bvh = build(&positions, &triangles, &[]);
