@@ -1,5 +1,5 @@
-//! From lists of primitives to a tree: gather boxes, split by binned SAH into a binary tree, collapse it to eight
-//! children, fill the leaves.
+//! From lists of primitives to a tree: gather boxes, split by binned SAH into a binary tree, put its large nodes where they fit better, collapse it to
+//! eight children, fill the leaves.
 //!
 //! Every step is a pure function of the input: threads only share out disjoint ranges, so the tree is the same,
 //! byte for byte, however many there are.
@@ -8,6 +8,7 @@ mod binary;
 mod collapse;
 mod gather;
 mod pack;
+mod reinsert;
 
 use crate::node::{Bvh, MAX_PRIMITIVES, STACK};
 
@@ -102,7 +103,12 @@ impl Bvh {
         if refs.is_empty() {
             return None;
         }
-        let tree = binary::build(&mut refs, split);
+        let mut tree = binary::build(&mut refs, split);
+        if split == binary::Split::Sah
+            && let Some(better) = reinsert::optimise(&tree, &refs)
+        {
+            (tree, refs) = better;
+        }
         Some(collapse::collapse(&tree, refs, input, settings, report))
     }
 }
