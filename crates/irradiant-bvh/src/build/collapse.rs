@@ -211,8 +211,12 @@ impl Layout {
                 let k = usize::from(choices[n][0]);
                 open(plan, choices, n, first, k, WIDTH - k, &mut slots);
             }
-            // Any-hit traversal takes the last slot first; smallest first meets something soonest (see `walk::any`).
-            slots.sort_by(|a, b| plan.half_area(b.0).total_cmp(&plan.half_area(a.0)));
+            // Any-hit traversal takes the last slot first. A few triangles in a box fill it and are soon tested; many are leaves of a tree, or hair (see
+            // `traverse::walk`). Of as many, the smaller box.
+            slots.sort_by(|&(a, _), &(b, _)| {
+                let few = plan.tree[b].count.cmp(&plan.tree[a].count);
+                few.then_with(|| plan.half_area(b).total_cmp(&plan.half_area(a)))
+            });
             let mut inner = Vec::with_capacity(WIDTH);
             for (i, &(child, first)) in slots.iter().enumerate() {
                 let count = plan.tree[child].count as usize;
