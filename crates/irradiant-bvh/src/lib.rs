@@ -12,7 +12,7 @@
 //! # Layout
 //! - [`ray`](Ray): what goes in and comes out, and the trait the caller implements.
 //! - `level`: which instructions may be used.
-//! - `build`: primitives, binned SAH, reinsertion, the collapse to eight children, the packing of triangles.
+//! - `build`: primitives, binned SAH, the collapse to eight children, the packing of triangles.
 //! - `node`: the tree in memory; `validate`: its invariants.
 //! - `triangle`: the watertight test, scalar and eight at a time.
 //! - `traverse`: the walk, once for closest hits and once for any hit, for one ray, for packets of sixteen that travel together, and for crowds of
@@ -21,7 +21,7 @@
 //! - `lanes`: four floats, or eight; `prefetch`: asking for memory early; `pages`: large arrays.
 //!
 //! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);
-//! Wald 2007 (binned SAH); Bittner, Hapala, Havran 2013 (reinsertion); Woop, Benthin, Wald 2013 (watertight triangles); Ize 2013 (conservative boxes);
+//! Wald 2007 (binned SAH); Woop, Benthin, Wald 2013 (watertight triangles); Ize 2013 (conservative boxes);
 //! Pharr, Jakob, Humphreys 2023, section 6.8.4 (error bounds of a triangle's `t`).
 #![deny(unsafe_code)]
 

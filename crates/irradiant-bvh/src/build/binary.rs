@@ -3,12 +3,14 @@
 //! Leaves hold at most [`LEAF`] triangles or one user primitive; the collapse decides what becomes a leaf of the final
 //! tree.
 //!
-//! What was tried, on two Granite Rapids cores shared with others (nodes and blocks a ray exactly, rates within 5 %):
+//! What was tried and is not here, on two Granite Rapids cores shared with others (nodes and blocks a ray exactly, rates within 5 to 10 %):
+//! - Reinsertion of large nodes before the collapse (Bittner, Hapala, Havran 2013; Meister and Bittner 2018; 3 rounds, a twentieth of the nodes each): nodes a ray in a room of
+//!   a million triangles 0.87 to 0.92, in a mesh of a million 0.94 to 0.96, in a street of 250,000 1.00. Yet single rays at 0.94 of the rate without it, geometric mean of
+//!   the benchmark's twelve kinds (three runs with, two without), the street's picture by `path` 1.08 of the time, the mesh's 1.03; builds 1.04 to 1.2.
 //! - Spatial splits (Stich, Friedrich, Dietrich 2009; 16 bins, triangles clipped, a fifth more references at most, of which a twelfth to a twentieth was used),
-//!   with reinsertion: in the street 10.6 nodes and 7.0 blocks a primary ray instead of 11.2 and 9.4, rates no different from those of reinsertion alone
-//!   within noise; room 11.6 and 5.2 instead of 11.6 and 6.5, 1.02 to 1.06; mesh the same. The street's picture no faster. Builds 2.7, 3.4 and 1.5 times as long.
-//!   A part's box does not hold the triangle's own, so the argument in `traverse` would need margins, and would hold only of rays that begin
-//!   near the tree.
+//!   with reinsertion: in the street 10.6 nodes and 7.0 blocks a primary ray instead of 11.2 and 9.4; room 11.6 and 5.2 instead of 11.6 and 6.5; mesh the same. The
+//!   street's picture no faster. Builds 2.7, 3.4 and 1.5 times as long. A part's box does not hold the triangle's own, so the argument in `traverse` would need
+//!   margins, and would hold only of rays that begin near the tree.
 //! - Large triangles split beforehand at medians of the whole (Karras and Aila 2013), a tenth, a fifth, two fifths more references: 6.9, 6.8, 6.3 blocks in the street,
 //!   as many nodes; the expected cost rises by a third, and rates do not.
 
@@ -68,9 +70,9 @@ struct Rules {
 
 /// Lower and upper corners, four lanes each.
 #[derive(Clone, Copy)]
-pub(super) struct Bounds {
-    pub lo: Native,
-    pub hi: Native,
+struct Bounds {
+    lo: Native,
+    hi: Native,
 }
 
 impl Bounds {
@@ -79,24 +81,12 @@ impl Bounds {
         Self { lo: Native::splat(f32::INFINITY), hi: Native::splat(f32::NEG_INFINITY) }
     }
     #[inline(always)]
-    pub fn grow(&mut self, lo: Native, hi: Native) {
+    fn grow(&mut self, lo: Native, hi: Native) {
         self.lo = self.lo.min(lo);
         self.hi = self.hi.max(hi);
     }
     fn half_area(&self) -> f64 {
         let [x, y, z, _] = (self.hi - self.lo).to_array().map(f64::from);
-        x * y + y * z + z * x
-    }
-    /// Brings extents to about 1 before areas are taken.
-    pub fn scale(&self) -> Native {
-        let [x, y, z, _] = (self.hi - self.lo).to_array();
-        let largest = x.max(y).max(z);
-        Native::splat(if largest > 0.0 { (1.0 / largest).min(1e37) } else { 0.0 })
-    }
-    /// Half the area at that scale.
-    #[inline(always)]
-    pub fn scaled_half_area(&self, scale: Native) -> f32 {
-        let [x, y, z, _] = ((self.hi - self.lo) * scale).to_array();
         x * y + y * z + z * x
     }
 }
@@ -232,7 +222,9 @@ impl Side {
 fn best_split(refs: &mut [Ref], boxes: &Bounds, centres: &Bounds, scratch: &mut Scratch) -> Option<usize> {
     let n_bins = (8 + refs.len() / 2).min(MAX_BINS);
     let extent = (centres.hi - centres.lo).to_array();
-    let area_scale = boxes.scale();
+    let size = (boxes.hi - boxes.lo).to_array();
+    let largest = size[0].max(size[1]).max(size[2]);
+    let area_scale = Native::splat(if largest > 0.0 { (1.0 / largest).min(1e37) } else { 0.0 });
     let mut scale = [0.0; 4];
     for axis in 0..3 {
         if extent[axis] > 0.0 {

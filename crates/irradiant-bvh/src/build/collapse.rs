@@ -212,10 +212,10 @@ impl Layout {
                 open(plan, choices, n, first, k, WIDTH - k, &mut slots);
             }
             // Any-hit traversal takes the last slot first. A few triangles in a box fill it and are soon tested; many are leaves of a tree, or hair (see
-            // `traverse::walk`). Of as many, the smaller box.
+            // `traverse::walk`). Of about as many, the smaller box.
+            let few = |n: usize| plan.tree[n].count.max(1).ilog2() / 2;
             slots.sort_by(|&(a, _), &(b, _)| {
-                let few = plan.tree[b].count.cmp(&plan.tree[a].count);
-                few.then_with(|| plan.half_area(b).total_cmp(&plan.half_area(a)))
+                few(b).cmp(&few(a)).then_with(|| plan.half_area(b).total_cmp(&plan.half_area(a)))
             });
             let mut inner = Vec::with_capacity(WIDTH);
             for (i, &(child, first)) in slots.iter().enumerate() {
