@@ -54,8 +54,8 @@
 //!
 //! On two Granite Rapids cores shared with others, by turns in one run:
 //! - Any hit, the child with the fewest triangles first, in classes of a factor of four, and in these the smallest box first; before, the smallest box in any case: the
-//!   street (walls, roofs, foliage) by `path` 0.83 of the CPU time, by `sharedpath` 0.87; 1,000 lamps, an interior and a million triangles under a sky 0.98 to 1.01.
-//!   Rays alone: in the street, to a sky all around, 1.8 times as many. By the exact number, the mesh's shadow rays were at 0.8 to 0.9 of the rate, the street at the same
+//!   street (walls, roofs, foliage) by `path` 0.83 of the CPU time, by `sharedpath` 0.87; 1,000 lamps, an interior and a million triangles under a sky 0.98 to 1.02.
+//!   Rays alone: in the street, to a sky all around, 1.8 times as many. By the exact number (with reinsertion, see `build/binary.rs`), the mesh's shadow rays were at 0.8 to 0.9 of the rate, the street at the same
 //!   time. Box times number, or its root or logarithm: the same within 3 %. Walls in the faces of the box of everything last: room 0.96, but the street gains 1.2 instead of 1.8.
 //! - Large pages under all of the tree: 1.00, second bounces in the mesh up to 1.05.
 //!

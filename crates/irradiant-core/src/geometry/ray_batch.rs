@@ -61,7 +61,7 @@ impl RayBatch {
         self.blocked[ray]
     }
 
-    /// The first `n` of these, each up to its `t_max`, instead of what there is.
+    /// Holds the first `n` of these, each up to its `t_max`, instead of what there was; [`LANES`] at most.
     #[inline(always)]
     pub fn take(&mut self, n: usize, o: &Triples, d: &Triples, time: &Floats, t_max: impl Fn(usize) -> f32) {
         self.n = n.min(LANES);

@@ -1,7 +1,7 @@
 //! What hits of many flat triangles look like, side by side.
 
 use super::accel::{Group, NO_EMITTER, Shapes};
-use super::triangle::{normal_and_length, triangle_point};
+use super::triangle::{Mesh, normal_and_length, triangle_point};
 use super::{Geometry, Hit, HitOf, Level, NO_INSTANCE};
 use crate::interaction::{Interaction, LightId, MaterialId, ReferencePoint};
 use irradiant_math::lanes::{Floats, LANES, Triples, whole};
@@ -190,16 +190,23 @@ pub(super) struct FlatTriangle {
 
 const _: () = assert!(size_of::<Option<FlatTriangle>>() == 48);
 
+#[inline(always)]
+fn is_flat(mesh: &Mesh) -> bool {
+    mesh.normals.is_empty() && mesh.tangents.is_empty() && mesh.uvs.is_empty()
+}
+
 impl FlatTriangle {
     /// So many are put together beforehand, 48 bytes each, so that a hit waits for memory once, and that has been asked for
     /// ([`Geometry::prefetch_flat_triangle`]), instead of for indices and then for corners. Share of the time: the Cornell box 0.98; a street of
     /// 250,000 0.91 by paths, 0.96 by shared paths.
     const MOST: usize = 1 << 20;
+    /// So many that are not flat may have an empty place among them; more only where as many are flat.
+    const EMPTY: usize = 1 << 16;
 
     #[inline(always)]
     fn of(shapes: &Shapes, mesh_index: u32, triangle: u32) -> Option<Self> {
         let mesh = &shapes.meshes[mesh_index as usize];
-        if !(mesh.normals.is_empty() && mesh.tangents.is_empty() && mesh.uvs.is_empty()) {
+        if !is_flat(mesh) {
             return None;
         }
         let [a, b, c] = mesh.triangles[triangle as usize];
@@ -212,13 +219,14 @@ impl FlatTriangle {
         Some(Self { corners, flip: mesh.flip, material: info.material, emitter })
     }
 
-    /// Those of the tree of the scene itself, by primitive; none where they are many.
+    /// Those of the tree of the scene itself, by primitive; none where they are many, or where too many places would be empty.
     pub(super) fn all(shapes: &Shapes, group: &Group) -> Vec<Option<Self>> {
-        let meshes =
-            || group.ranges.iter().map(|range| (range.mesh, shapes.meshes[range.mesh as usize].triangles.len()));
-        if meshes().map(|(_, triangles)| triangles).sum::<usize>() > Self::MOST {
+        let meshes = || group.ranges.iter().map(|range| (range.mesh, &shapes.meshes[range.mesh as usize]));
+        let all: usize = meshes().map(|(_, mesh)| mesh.triangles.len()).sum();
+        let flat: usize = meshes().filter(|(_, mesh)| is_flat(mesh)).map(|(_, mesh)| mesh.triangles.len()).sum();
+        if flat == 0 || all > Self::MOST || all - flat > flat.max(Self::EMPTY) {
             return Vec::new();
         }
-        meshes().flat_map(|(mesh, n)| (0..n as u32).map(move |i| Self::of(shapes, mesh, i))).collect()
+        meshes().flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |i| Self::of(shapes, mesh, i))).collect()
     }
 }
