@@ -1,7 +1,7 @@
 //! Four, eight or sixteen floats at a time, each lane an unfused IEEE operation (but for `multiply_add`).
 //!
-//! `Portable` is arrays and loops and is what other architectures get; `Sse` is the x86-64 baseline; `Twice` is two of
-//! either, `Avx` eight in one register, `Pair` two of eight, and `Avx512` sixteen in one register. Comparisons give all-ones or all-zeros lanes. `min(a, b)` is `if a < b { a } else { b }` lane by lane, so a NaN in `a` gives `b`.
+//! `Portable` is arrays and loops and is what other architectures get; `Sse` is the x86-64 baseline, `Neon` that of aarch64; `Twice` is two of
+//! any of these, `Avx` eight in one register, `Pair` two of eight, and `Avx512` sixteen in one register. Comparisons give all-ones or all-zeros lanes. `min(a, b)` is `if a < b { a } else { b }` lane by lane, so a NaN in `a` gives `b`.
 
 use std::ops::{Add, BitAnd, BitOr, Div, IndexMut, Mul, Sub};
 
@@ -46,6 +46,25 @@ pub(crate) trait Eight: Lanes<Array = [f32; 8]> {
     fn choose<const N: usize>(lanes: [Self; 3], words: [u32; N]) -> [[Self; 3]; N];
 }
 
+/// Four lanes.
+pub(crate) trait Four: Lanes<Array = [f32; 4]> {
+    /// Lanes from 0 to 2^31, rounded down; what others become differs from machine to machine.
+    fn round_down(self) -> [u32; 4];
+    /// Whole numbers below 2^31.
+    fn from_integers(a: [u32; 4]) -> Self;
+    /// The first lanes of all three, the second, the third; the fourth is noise.
+    fn transpose(rows: [Self; 3]) -> [Self; 3];
+    /// Lane `i` becomes that of the first four or the second four that the lowest three of the four bits at `4 i` name.
+    #[inline(always)]
+    fn choose(low: Self, high: Self, word: u32) -> Self {
+        let from = [low.to_array(), high.to_array()];
+        let from = from.as_flattened();
+        Self::load(&std::array::from_fn(|i| from[(word >> (4 * i)) as usize & 7]))
+    }
+}
+
+/// Where there is something better it is the specification of it.
+#[cfg_attr(target_arch = "aarch64", allow(dead_code))]
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Portable([f32; 4]);
@@ -71,31 +90,30 @@ portable_operator!(Div, div, a, b, a / b);
 portable_operator!(BitAnd, bitand, a, b, f32::from_bits(a.to_bits() & b.to_bits()));
 portable_operator!(BitOr, bitor, a, b, f32::from_bits(a.to_bits() | b.to_bits()));
 
+#[cfg_attr(target_arch = "aarch64", allow(dead_code))]
 impl Portable {
     #[inline(always)]
     fn zip(self, b: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(std::array::from_fn(|i| f(self.0[i], b.0[i])))
     }
-    /// Lanes from 0 to 2^31, rounded down; what others become differs from machine to machine.
+}
+
+impl Four for Portable {
     #[inline(always)]
-    #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
-    pub fn round_down(self) -> [u32; 4] {
+    fn round_down(self) -> [u32; 4] {
         self.0.map(|x| x as u32)
     }
-    /// Whole numbers below 2^31.
     #[inline(always)]
-    #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
-    pub fn from_integers(a: [u32; 4]) -> Self {
+    fn from_integers(a: [u32; 4]) -> Self {
         Self(a.map(|x| x as f32))
     }
-    /// The first lanes of all three, the second, the third; the fourth is noise.
     #[inline(always)]
-    #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
-    pub fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+    fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
         std::array::from_fn(|i| Self([a.0[i], b.0[i], c.0[i], 0.0]))
     }
 }
 
+#[cfg_attr(target_arch = "aarch64", allow(dead_code))]
 #[inline(always)]
 fn all_ones_if(condition: bool) -> f32 {
     f32::from_bits(if condition { u32::MAX } else { 0 })
@@ -244,11 +262,11 @@ doubled!(
     Pair, 8, 16
 );
 
-impl<F: Lanes<Array = [f32; 4]>> Eight for Twice<F> {
+impl<F: Four> Eight for Twice<F> {
     #[inline(always)]
     fn choose<const N: usize>(lanes: [Self; 3], words: [u32; N]) -> [[Self; 3]; N] {
-        let from = lanes.map(Self::to_array);
-        words.map(|word| from.map(|axis| Self::load(&std::array::from_fn(|i| axis[(word >> (4 * i)) as usize & 7]))))
+        words
+            .map(|word| lanes.map(|Self(low, high)| Self(F::choose(low, high, word), F::choose(low, high, word >> 16))))
     }
 }
 
@@ -261,8 +279,161 @@ pub(crate) use sse::Sse;
 #[cfg(target_arch = "x86_64")]
 pub(crate) type Native = Sse;
 /// The lanes to build with: the best that every machine of this target has.
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(target_arch = "aarch64")]
+pub(crate) type Native = neon::Neon;
+/// The lanes to build with: the best that every machine of this target has.
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub(crate) type Native = Portable;
+
+/// The lanes of [`Level::Neon`](crate::Level::Neon).
+#[cfg(target_arch = "aarch64")]
+pub(crate) type NeonOrPortable = neon::Neon;
+/// The lanes of [`Level::Neon`](crate::Level::Neon).
+#[cfg(not(target_arch = "aarch64"))]
+pub(crate) type NeonOrPortable = Portable;
+
+#[cfg(target_arch = "aarch64")]
+#[allow(unsafe_code)]
+mod neon {
+    use super::*;
+    use core::arch::aarch64::*;
+
+    /// Calls baseline intrinsics.
+    macro_rules! baseline {
+        ($e:expr) => {
+            // SAFETY: NEON is part of every aarch64 target with floats, and the only pointers are to whole arrays of four,
+            // read or written unaligned. Guard: `neon_lanes_agree_with_portable_ones`.
+            unsafe { $e }
+        };
+    }
+
+    #[derive(Clone, Copy, Debug)]
+    #[repr(transparent)]
+    pub(crate) struct Neon(float32x4_t);
+
+    macro_rules! operator {
+        ($trait:ident, $method:ident, $e:expr) => {
+            impl $trait for Neon {
+                type Output = Self;
+                #[inline(always)]
+                fn $method(self, b: Self) -> Self {
+                    let operation: fn(Self, Self) -> Self = $e;
+                    operation(self, b)
+                }
+            }
+        };
+    }
+    operator!(Add, add, |a, b| Self(baseline!(vaddq_f32(a.0, b.0))));
+    operator!(Sub, sub, |a, b| Self(baseline!(vsubq_f32(a.0, b.0))));
+    operator!(Mul, mul, |a, b| Self(baseline!(vmulq_f32(a.0, b.0))));
+    operator!(Div, div, |a, b| Self(baseline!(vdivq_f32(a.0, b.0))));
+    operator!(BitAnd, bitand, |a, b| Self::from_bits(baseline!(vandq_u32(a.bits(), b.bits()))));
+    operator!(BitOr, bitor, |a, b| Self::from_bits(baseline!(vorrq_u32(a.bits(), b.bits()))));
+
+    impl Neon {
+        #[inline(always)]
+        fn bits(self) -> uint32x4_t {
+            baseline!(vreinterpretq_u32_f32(self.0))
+        }
+        #[inline(always)]
+        fn from_bits(bits: uint32x4_t) -> Self {
+            Self(baseline!(vreinterpretq_f32_u32(bits)))
+        }
+        #[inline(always)]
+        fn integers(a: [u32; 4]) -> uint32x4_t {
+            baseline!(vld1q_u32(a.as_ptr()))
+        }
+    }
+
+    impl Lanes for Neon {
+        type Array = [f32; 4];
+        const ALL: u32 = 0xf;
+        #[inline(always)]
+        fn load(a: &[f32; 4]) -> Self {
+            Self(baseline!(vld1q_f32(a.as_ptr())))
+        }
+        #[inline(always)]
+        fn splat(a: f32) -> Self {
+            Self(baseline!(vdupq_n_f32(a)))
+        }
+        #[inline(always)]
+        fn to_array(self) -> [f32; 4] {
+            let mut a = [0.0; 4];
+            baseline!(vst1q_f32(a.as_mut_ptr(), self.0));
+            a
+        }
+        // `vminq` and `vmaxq` give NaN for any NaN.
+        #[inline(always)]
+        fn min(self, b: Self) -> Self {
+            Self(baseline!(vbslq_f32(vcltq_f32(self.0, b.0), self.0, b.0)))
+        }
+        #[inline(always)]
+        fn max(self, b: Self) -> Self {
+            Self(baseline!(vbslq_f32(vcgtq_f32(self.0, b.0), self.0, b.0)))
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            Self(baseline!(vabsq_f32(self.0)))
+        }
+        #[inline(always)]
+        fn multiply_add(self, b: Self, c: Self) -> Self {
+            Self(baseline!(vfmaq_f32(c.0, self.0, b.0)))
+        }
+        #[inline(always)]
+        fn lt(self, b: Self) -> Self {
+            Self::from_bits(baseline!(vcltq_f32(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn le(self, b: Self) -> Self {
+            Self::from_bits(baseline!(vcleq_f32(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn mask(self) -> u32 {
+            let places = baseline!(vld1q_s32([0, 1, 2, 3].as_ptr()));
+            baseline!(vaddvq_u32(vshlq_u32(vshrq_n_u32::<31>(self.bits()), places)))
+        }
+        #[inline(always)]
+        fn select(mask: u32, a: Self, b: Self) -> Self {
+            let chosen = baseline!(vtstq_u32(vdupq_n_u32(mask), Self::integers([1, 2, 4, 8])));
+            Self(baseline!(vbslq_f32(chosen, a.0, b.0)))
+        }
+        #[inline(always)]
+        fn look_up([x, y, z]: &[[f32; 8]; 3], rows: Self, column: usize) -> Self {
+            let is = |row: u32| baseline!(vceqq_u32(rows.bits(), vdupq_n_u32(row << 3)));
+            let [x, y, z] = [x, y, z].map(|axis| Self::splat(axis[column]).0);
+            Self(baseline!(vbslq_f32(is(0), x, vbslq_f32(is(1), y, z))))
+        }
+    }
+
+    impl Four for Neon {
+        #[inline(always)]
+        fn round_down(self) -> [u32; 4] {
+            let mut a = [0; 4];
+            baseline!(vst1q_u32(a.as_mut_ptr(), vcvtq_u32_f32(self.0)));
+            a
+        }
+        #[inline(always)]
+        fn from_integers(a: [u32; 4]) -> Self {
+            Self(baseline!(vcvtq_f32_u32(Self::integers(a))))
+        }
+        #[inline(always)]
+        fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+            let (even, odd) = (baseline!(vtrn1q_f32(a.0, b.0)), baseline!(vtrn2q_f32(a.0, b.0)));
+            let low = |ab, c| baseline!(vcombine_f32(vget_low_f32(ab), vget_low_f32(c)));
+            let third = baseline!(vcombine_f32(vget_high_f32(even), vget_high_f32(c.0)));
+            [Self(low(even, c.0)), Self(low(odd, baseline!(vdupq_laneq_f32::<1>(c.0)))), Self(third)]
+        }
+        #[inline(always)]
+        fn choose(low: Self, high: Self, word: u32) -> Self {
+            // Four bits at `4 i` into lane `i`, and from there the four bytes of the number that they name.
+            let shifts = baseline!(vld1q_s32([0, -4, -8, -12].as_ptr()));
+            let names = baseline!(vandq_u32(vshlq_u32(vdupq_n_u32(word), shifts), vdupq_n_u32(7)));
+            let bytes = baseline!(vmlaq_n_u32(vdupq_n_u32(0x0302_0100), names, 0x0404_0404));
+            let table = baseline!(uint8x16x2_t(vreinterpretq_u8_f32(low.0), vreinterpretq_u8_f32(high.0)));
+            Self(baseline!(vreinterpretq_f32_u8(vqtbl2q_u8(table, vreinterpretq_u8_u32(bytes)))))
+        }
+    }
+}
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
@@ -301,22 +472,19 @@ mod sse {
     operator!(BitAnd, bitand, _mm_and_ps);
     operator!(BitOr, bitor, _mm_or_ps);
 
-    impl Sse {
-        /// Lanes from 0 to 2^31, rounded down; what others become differs from machine to machine.
+    impl Four for Sse {
         #[inline(always)]
-        pub fn round_down(self) -> [u32; 4] {
+        fn round_down(self) -> [u32; 4] {
             let mut a = [0; 4];
             baseline!(_mm_storeu_si128(a.as_mut_ptr().cast(), _mm_cvttps_epi32(self.0)));
             a
         }
-        /// Whole numbers below 2^31.
         #[inline(always)]
-        pub fn from_integers(a: [u32; 4]) -> Self {
+        fn from_integers(a: [u32; 4]) -> Self {
             Self(baseline!(_mm_cvtepi32_ps(_mm_loadu_si128(a.as_ptr().cast()))))
         }
-        /// The first lanes of all three, the second, the third; the fourth is noise.
         #[inline(always)]
-        pub fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+        fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
             let (low, high) = (baseline!(_mm_unpacklo_ps(a.0, b.0)), baseline!(_mm_unpackhi_ps(a.0, b.0)));
             [
                 Self(baseline!(_mm_shuffle_ps::<0b00_00_01_00>(low, c.0))),
@@ -576,37 +744,57 @@ mod avx {
     }
 }
 
-#[cfg(all(test, target_arch = "x86_64"))]
+#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod tests {
     use super::*;
 
     const VALUES: [f32; 12] =
         [0.0, -0.0, 1.0, -1.5, 1e-40, 3e38, -3e38, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.3, 7.25];
 
-    #[test]
-    fn sse_lanes_agree_with_portable_ones() {
+    const WORDS: [u32; 3] = [0x7654_3210, 0x0123_4567, 0xf8f9_1122];
+
+    fn agrees_with_portable_ones<F: Four>() {
         for x in [[0.0, -0.0, 0.99, 1.0], [1.5, 63.999, 1e-40, 2_147_483_520.0]] {
-            assert_eq!(Portable::load(&x).round_down(), Sse::load(&x).round_down());
+            assert_eq!(Portable::load(&x).round_down(), F::load(&x).round_down());
             let n = Portable::load(&x).round_down();
-            assert_eq!(Portable::from_integers(n).to_array(), Sse::from_integers(n).to_array());
+            assert_eq!(Portable::from_integers(n).to_array(), F::from_integers(n).to_array());
         }
         let rows = [[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [9.0, 10.0, 11.0, 12.0]];
         let columns = Portable::transpose(rows.map(|r| Portable::load(&r))).map(|c| c.to_array());
-        let same_columns = Sse::transpose(rows.map(|r| Sse::load(&r))).map(|c| c.to_array());
+        let same_columns = F::transpose(rows.map(|r| F::load(&r))).map(|c| c.to_array());
         for i in 0..3 {
             assert_eq!(columns[i][..3], same_columns[i][..3]);
         }
         for (i, &a) in VALUES.iter().enumerate() {
             for &b in &VALUES {
                 let (x, y) = ([a, b, VALUES[(i + 1) % 12], -a], [b, a, 0.5, b]);
-                same(&run::<Portable>(x, y), &run::<Sse>(x, y));
+                same(&run::<Portable>(x, y), &run::<F>(x, y));
                 let (x, y) = ([a, b, b, a, 1.0, b, VALUES[(i + 1) % 12], -a], [b, a, a, 1.0, b, -b, 0.5, b]);
-                same(&run::<Twice<Portable>>(x, y), &run::<Twice<Sse>>(x, y));
+                same(&run::<Twice<Portable>>(x, y), &run::<Twice<F>>(x, y));
             }
+        }
+        for word in WORDS {
+            let (low, high) = ([0.5, 1.5, 2.5, 3.5], [4.5, 5.5, 6.5, 7.5]);
+            let chosen = F::choose(F::load(&low), F::load(&high), word);
+            let expected = Portable::choose(Portable::load(&low), Portable::load(&high), word);
+            assert_eq!(chosen.to_array(), expected.to_array());
         }
     }
 
     #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn sse_lanes_agree_with_portable_ones() {
+        agrees_with_portable_ones::<Sse>();
+    }
+
+    #[test]
+    #[cfg(target_arch = "aarch64")]
+    fn neon_lanes_agree_with_portable_ones() {
+        agrees_with_portable_ones::<neon::Neon>();
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
     fn avx_lanes_agree_with_portable_ones() {
         #[target_feature(enable = "avx2,fma")]
@@ -621,7 +809,6 @@ mod tests {
             let chosen = P::choose(lanes, WORDS).as_flattened().iter().map(|l| l.to_array()).collect::<Vec<_>>();
             [run::<P>(x, y), chosen].concat()
         }
-        const WORDS: [u32; 3] = [0x7654_3210, 0x0123_4567, 0xf8f9_1122];
         if !is_x86_feature_detected!("avx2") || !is_x86_feature_detected!("fma") {
             return;
         }
@@ -635,6 +822,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
     fn avx512_lanes_agree_with_portable_ones() {
         #[target_feature(enable = "avx512f,avx512dq")]

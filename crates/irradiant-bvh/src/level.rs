@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 pub enum Level {
     /// Plain scalar code: the specification.
     Scalar,
-    /// Four lanes through the portable wrapper, which compiles to NEON on aarch64 and to whatever the target has elsewhere.
+    /// Four lanes: NEON, which every aarch64 machine has; elsewhere arrays and loops.
     Neon,
     /// The x86-64 baseline (SSE2).
     Sse,

@@ -29,7 +29,18 @@ pub(crate) fn lines<const N: usize>(start: *const u8) {
         // Guard: `prefetching_anything_is_harmless`.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * i).cast()) }
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(target_arch = "aarch64")]
+    for i in 0..N {
+        // SAFETY: as above; the instruction is part of every aarch64.
+        unsafe {
+            core::arch::asm!(
+                "prfm pldl1keep, [{}]",
+                in(reg) start.wrapping_add(64 * i),
+                options(nostack, readonly, preserves_flags)
+            );
+        }
+    }
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     let _ = start;
 }
 

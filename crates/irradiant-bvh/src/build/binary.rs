@@ -15,7 +15,7 @@
 //!   as many nodes; the expected cost rises by a third, and rates do not.
 
 use super::gather::Ref;
-use crate::lanes::{Lanes, Native};
+use crate::lanes::{Four, Lanes, Native};
 
 /// Ranges of this many triangles or fewer are not split, unless large: connected ones fit one block.
 const LEAF: usize = 5;

@@ -7,7 +7,7 @@ use super::crowd;
 use super::packet::PACKET;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::Sse;
-use crate::lanes::{Pair, Portable, Twice};
+use crate::lanes::{NeonOrPortable, Pair, Twice};
 use crate::level::Level;
 use crate::node::Bvh;
 use crate::part::Part;
@@ -23,7 +23,7 @@ macro_rules! at_level {
             Level::Avx2 => $avx2($($argument),*),
             #[cfg(target_arch = "x86_64")]
             Level::Sse => { use $kernel as kernel; kernel::<Pair<Twice<Sse>>, Halves<Sse>, L>($($argument),*) }
-            _ => { use $kernel as kernel; kernel::<Pair<Twice<Portable>>, Halves<Portable>, L>($($argument),*) }
+            _ => { use $kernel as kernel; kernel::<Pair<Twice<NeonOrPortable>>, Halves<NeonOrPortable>, L>($($argument),*) }
         }
     };
 }

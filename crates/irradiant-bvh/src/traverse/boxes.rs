@@ -1,7 +1,7 @@
 //! Eight boxes at once.
 
 use super::PADDING;
-use crate::lanes::{Eight, Lanes, Twice};
+use crate::lanes::{Eight, Four, Twice};
 use crate::node::{Node, WIDTH};
 use crate::ray::Ray;
 
@@ -42,7 +42,7 @@ pub(crate) struct Halves<F> {
     first: [usize; 3],
 }
 
-impl<F: Lanes<Array = [f32; 4]>> BoxTest for Halves<F> {
+impl<F: Four> BoxTest for Halves<F> {
     type Eight = Twice<F>;
 
     #[inline(always)]
@@ -81,7 +81,7 @@ pub(crate) mod x86 {
     use core::arch::x86_64::*;
 
     use super::*;
-    use crate::lanes::{Avx, Avx512, Pair, Sse};
+    use crate::lanes::{Avx, Avx512, Lanes, Pair, Sse};
     use crate::level::Level;
     use crate::node::{Bvh, Child};
     use crate::ray::{Closest, Leaves};

@@ -94,7 +94,7 @@ impl Bvh {
             Level::Scalar => scalar::closest(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
             Level::Sse => walk::closest::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
-            _ => walk::closest::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
+            _ => walk::closest::<boxes::Halves<crate::lanes::NeonOrPortable>, L>(self, start, ray, leaves),
         }
     }
 
@@ -123,7 +123,7 @@ impl Bvh {
             Level::Scalar => scalar::any(self, start, ray, leaves),
             #[cfg(target_arch = "x86_64")]
             Level::Sse => walk::any::<boxes::Halves<crate::lanes::Sse>, L>(self, start, ray, leaves),
-            _ => walk::any::<boxes::Halves<crate::lanes::Portable>, L>(self, start, ray, leaves),
+            _ => walk::any::<boxes::Halves<crate::lanes::NeonOrPortable>, L>(self, start, ray, leaves),
         }
     }
 }
