@@ -6,7 +6,7 @@ use crate::machine::Machine;
 use crate::peers::{self, Contestants};
 use crate::picture::{Mask, Picture, Truth};
 use crate::pictures::write_scene;
-use crate::rays::{self, embree::Embree, on_threads, ours, sets};
+use crate::rays::{self, builds, on_threads, ours, sets};
 use crate::scene;
 use cpu_time::ThreadTime;
 use irradiant_bvh::Ray;
@@ -21,6 +21,9 @@ pub struct Size {
     pub triangles: usize,
     /// CPU seconds of the build, one thread.
     pub build_seconds: f64,
+    /// Of them those of other threads than the one that asked; none: measured before they were told apart, and "one thread" may have been two.
+    #[serde(default)]
+    pub helped_seconds: Option<f64>,
     /// Nanoseconds per primary ray, one at a time.
     pub primary: f64,
     /// Nanoseconds per ray of the first bounce.
@@ -49,6 +52,9 @@ pub struct Lamps {
 pub struct Report {
     /// Where and when.
     pub machine: Machine,
+    /// Which libraries of Embree.
+    #[serde(default)]
+    pub embrees: Vec<String>,
     /// By triangles.
     pub sizes: Vec<Size>,
     /// By lamps.
@@ -69,28 +75,38 @@ fn per_ray(rays: &[Ray], trace: impl Fn(&[Ray], &mut [f32])) -> f64 {
     best / rays.len() as f64 * 1e9
 }
 
-fn sizes(largest: usize, setting: &Setting, missing: &mut Vec<String>) -> Result<Vec<Size>, String> {
-    let (libraries, lacking) = rays::libraries(setting);
-    missing.extend(lacking);
+fn sizes(largest: usize, embrees: &rays::Embrees, missing: &mut Vec<String>) -> Result<Vec<Size>, String> {
+    const BUILDS: usize = 3;
     let mut found = Vec::new();
-    let embrees: Vec<Embree> = libraries.iter().filter_map(|p| Embree::load(p).ok()).collect();
     for n in [71, 224, 708, 2237].into_iter().filter(|n| 2 * n * (n - 1) <= largest + largest / 100) {
         let subject = sets::displaced(n);
         let geometry = &subject.geometry;
         let tree = on_threads(1, || ours::Tree::build(geometry))?;
         let [primary, bounce, ..] = sets::rays(&subject, &tree, 512);
-        let mut say = |tracer: String, build_seconds, memory_bytes, trace: &dyn Fn(&[Ray], &mut [f32])| {
+        let builds = builds::by_turns(&format!("displaced-{n}"), 1, &embrees.builders, BUILDS);
+        let mut builds = embrees.builders.iter().zip(builds);
+        let mut say = |trace: &dyn Fn(&[Ray], &mut [f32])| {
+            let Some(((tracer, _), build)) = builds.next() else { return };
+            let builds::Once { spent, memory_bytes } = match build {
+                Ok(once) => once,
+                Err(why) => {
+                    println!("  left out: {why}");
+                    missing.push(why);
+                    return;
+                }
+            };
             let (primary, bounce) = (per_ray(&primary.rays, trace), per_ray(&bounce.rays, trace));
-            let triangles = geometry.triangles();
+            let (triangles, build_seconds) = (geometry.triangles(), spent.cpu_seconds);
             println!(
                 "{triangles:9} triangles {tracer:12} build {build_seconds:7.3} CPU s, primary {primary:6.1} ns, bounce {bounce:6.1} ns"
             );
-            found.push(Size { tracer, triangles, build_seconds, primary, bounce, memory_bytes });
+            let (tracer, helped_seconds) = (tracer.clone(), Some(spent.helped_seconds));
+            found.push(Size { tracer, triangles, build_seconds, helped_seconds, primary, bounce, memory_bytes });
         };
-        say("Irradiant".into(), tree.cpu_seconds, tree.memory_bytes(), &|r, o| tree.closest(r, o));
-        for e in &embrees {
+        say(&|r, o| tree.closest(r, o));
+        for e in &embrees.libraries {
             let tree = e.build(geometry, false, 1)?;
-            say(format!("Embree {}", e.major), tree.cpu_seconds, tree.memory_bytes(), &|r, o| tree.closest(r, o));
+            say(&|r, o| tree.closest(r, o));
         }
     }
     Ok(found)
@@ -141,10 +157,11 @@ fn lamps(largest: usize, setting: &Setting, missing: &mut Vec<String>) -> Result
 /// Measures up to so many triangles, and up to a hundredth of it lamps, and prints as it goes.
 pub fn run(largest: usize, setting: &Setting) -> Result<Report, String> {
     let machine = Machine::here(&setting.repository, setting.given);
-    let mut missing = Vec::new();
-    let sizes = sizes(largest, setting, &mut missing)?;
+    let embrees = rays::embrees(setting);
+    let mut missing = embrees.missing.clone();
+    let sizes = sizes(largest, &embrees, &mut missing)?;
     let lamps = lamps(largest / 100, setting, &mut missing)?;
     missing.sort();
     missing.dedup();
-    Ok(Report { machine, sizes, lamps, missing })
+    Ok(Report { machine, embrees: embrees.versions, sizes, lamps, missing })
 }

@@ -122,6 +122,16 @@ enum What {
     },
     /// Write the page of results from the data
     Page,
+    /// Build a scene once and print what it cost: what the benchmark starts for each build that it measures
+    #[command(hide = true)]
+    BuildOnce {
+        /// As `rays::sets::by_name` knows it
+        scene: String,
+        /// Exactly so many
+        threads: usize,
+        /// Of Embree; without it, ours builds
+        library: Option<PathBuf>,
+    },
     /// Everything, and the page
     All {
         /// Fewer samples, seeds and rays: minutes instead of hours
@@ -183,6 +193,9 @@ fn run(cli: &Cli) -> Result<(), String> {
         let folder = cli.places.peers.as_deref().ok_or("where to? say --peers FOLDER, outside of the repository")?;
         return peers::install(&absolute(folder)?, python);
     }
+    if let What::BuildOnce { scene, threads, library } = &cli.what {
+        return rays::builds::child(scene, *threads, library.as_deref());
+    }
     let setting = setting(&cli.places)?;
     let pictures = |scenes: &[String], amount: &pictures::Amount| -> Result<(), String> {
         for name in scenes {
@@ -199,7 +212,7 @@ fn run(cli: &Cli) -> Result<(), String> {
         |amount: &street::Amount| write_json(&setting.results.join("street.json"), &street::run(amount, &setting)?);
     let growth = |largest| write_json(&setting.results.join("growth.json"), &growth::run(largest, &setting)?);
     match &cli.what {
-        What::Install { .. } => return Ok(()),
+        What::Install { .. } | What::BuildOnce { .. } => return Ok(()),
         What::Pictures { scenes, spp, seeds, reference_spp } => {
             pictures(scenes, &pictures::Amount { spp: *spp, seeds: *seeds, reference_spp: *reference_spp })?;
         }

@@ -103,9 +103,17 @@ pub fn all(setting: &Setting, folder: &Path) -> (Contestants, Vec<String>) {
     let Some(peers) = &setting.peers else {
         return (contestants, vec!["all peers: no --peers folder".into()]);
     };
+    let wanted = |name: &str| {
+        let name = name.to_lowercase();
+        setting.only.is_empty() || setting.only.iter().any(|o| name.contains(&o.to_lowercase()))
+    };
+    let llvm = llvm();
+    if llvm.is_none() && wanted("Mitsuba llvm") {
+        missing.push("Mitsuba llvm: no libLLVM of version 17 or newer".into());
+    }
     let scripts = setting.repository.join("bench/peers");
     let mut start = |name: &str, home: &str, script: &str, extra: &[&str], environment: &[(String, String)]| {
-        if !setting.only.is_empty() && !setting.only.iter().any(|o| name.to_lowercase().contains(&o.to_lowercase())) {
+        if !wanted(name) {
             return;
         }
         let python = peers.join(home).join("bin/python");
@@ -118,13 +126,10 @@ pub fn all(setting: &Setting, folder: &Path) -> (Contestants, Vec<String>) {
             Err(why) => missing.push(format!("{name}: {why}")),
         }
     };
-    match llvm() {
-        Some(library) => {
-            let environment = [("DRJIT_LIBLLVM_PATH".to_string(), library.to_string_lossy().into_owned())];
-            start("Mitsuba llvm", "mitsuba", "mitsuba_peer.py", &["llvm_ad_rgb", "independent"], &environment);
-            start("Mitsuba llvm mj", "mitsuba", "mitsuba_peer.py", &["llvm_ad_rgb", "multijitter"], &environment);
-        }
-        None => println!("  left out: Mitsuba llvm: no libLLVM of version 17 or newer"),
+    if let Some(library) = llvm {
+        let environment = [("DRJIT_LIBLLVM_PATH".to_string(), library.to_string_lossy().into_owned())];
+        start("Mitsuba llvm", "mitsuba", "mitsuba_peer.py", &["llvm_ad_rgb", "independent"], &environment);
+        start("Mitsuba llvm mj", "mitsuba", "mitsuba_peer.py", &["llvm_ad_rgb", "multijitter"], &environment);
     }
     start("Mitsuba scalar", "mitsuba", "mitsuba_peer.py", &["scalar_rgb", "independent"], &[]);
     start("Cycles", "cycles", "cycles_peer.py", &[], &[]);

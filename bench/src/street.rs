@@ -33,6 +33,9 @@ pub struct Point {
     pub cpu_seconds: f64,
     /// Load of the machine before.
     pub load: f64,
+    /// Name and version.
+    #[serde(default)]
+    pub version: String,
 }
 
 /// All of it.
@@ -135,7 +138,8 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
                 "  {name:22} {spp:3} spp: relMSE {error:.5}, {:6.2} CPU s, {rate:6.3} Mpaths/CPU s, load {before:.1}",
                 cost.cpu_seconds
             );
-            points.push(Point { name: name.clone(), spp, error, cpu_seconds: cost.cpu_seconds, load: before });
+            let version = contestant.version();
+            points.push(Point { name: name.clone(), spp, error, cpu_seconds: cost.cpu_seconds, load: before, version });
         }
     }
     let find = |name: &str| points.iter().filter(|p| p.name == name).collect::<Vec<_>>();

@@ -5,15 +5,14 @@
 //! `tests::fields_are_where_embree_puts_them` guards the layout whenever `EMBREE_LIBRARY` names a library.
 #![allow(unsafe_code)]
 
+use super::builds::{Spent, Stopwatch};
 use super::sets::{Geometry, Placement};
 use crate::scene::Mesh;
-use cpu_time::ProcessTime;
 use irradiant_bvh::Ray;
 use libloading::Library;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::Path;
 use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
-use std::time::Instant;
 
 type Handle = *mut c_void;
 
@@ -109,6 +108,7 @@ enum Queries {
 pub struct Embree {
     new_device: unsafe extern "C" fn(*const c_char) -> Handle,
     release_device: unsafe extern "C" fn(Handle),
+    device_property: unsafe extern "C" fn(Handle, c_int) -> isize,
     monitor: unsafe extern "C" fn(Handle, unsafe extern "C" fn(*mut c_void, isize, bool) -> bool, *mut c_void),
     new_scene: unsafe extern "C" fn(Handle) -> Handle,
     scene_flags: unsafe extern "C" fn(Handle, c_int),
@@ -162,6 +162,7 @@ impl Embree {
         Ok(Self {
             new_device: symbol!(b"rtcNewDevice"),
             release_device: symbol!(b"rtcReleaseDevice"),
+            device_property: symbol!(b"rtcGetDeviceProperty"),
             monitor: symbol!(b"rtcSetDeviceMemoryMonitorFunction"),
             new_scene: symbol!(b"rtcNewScene"),
             scene_flags: symbol!(b"rtcSetSceneFlags"),
@@ -180,7 +181,23 @@ impl Embree {
         })
     }
 
-    /// Builds a scene at medium quality, the default, on so many threads.
+    /// As it says itself.
+    pub fn version(&self) -> String {
+        const VERSION: c_int = 0;
+        // SAFETY: no configuration is the default one; a device that could be made is asked and released.
+        let number = unsafe {
+            let device = (self.new_device)(std::ptr::null());
+            if device.is_null() {
+                return "unknown".into();
+            }
+            let number = (self.device_property)(device, VERSION);
+            (self.release_device)(device);
+            number
+        };
+        format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100)
+    }
+
+    /// Builds a scene at medium quality, the default, on so many threads; on more, if an earlier device of this process asked for more.
     pub fn build<'a>(&'a self, geometry: &'a Geometry, robust: bool, threads: usize) -> Result<Tree<'a>, String> {
         let config = CString::new(format!("threads={threads},set_affinity=0")).map_err(|e| e.to_string())?;
         let bytes = Box::new(AtomicIsize::new(0));
@@ -197,11 +214,10 @@ impl Embree {
             scene: std::ptr::null_mut(),
             parts: Vec::new(),
             bytes,
-            seconds: 0.0,
-            cpu_seconds: 0.0,
+            spent: Spent::default(),
             _geometry: geometry,
         };
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let watch = Stopwatch::start();
         tree.scene = tree.new_scene(robust);
         if geometry.placements.is_empty() {
             geometry.meshes.iter().for_each(|mesh| tree.attach_mesh(tree.scene, mesh));
@@ -217,7 +233,7 @@ impl Embree {
         }
         // SAFETY: the scene is alive and its buffers are borrowed for as long as the tree lives.
         unsafe { (self.commit_scene)(tree.scene) };
-        (tree.seconds, tree.cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        tree.spent = watch.spent();
         Ok(tree)
     }
 }
@@ -236,10 +252,8 @@ pub struct Tree<'a> {
     scene: Handle,
     parts: Vec<Handle>,
     bytes: Box<AtomicIsize>,
-    /// Of the build, on the wall.
-    pub seconds: f64,
-    /// Of the build, all threads.
-    pub cpu_seconds: f64,
+    /// By the build.
+    pub spent: Spent,
     // Embree reads vertices and indices where they are.
     _geometry: &'a Geometry,
 }

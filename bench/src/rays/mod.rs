@@ -1,5 +1,6 @@
 //! Ray rates against Embree: the same rays for all, interleaved, in one run.
 
+pub mod builds;
 pub mod embree;
 pub mod ours;
 pub mod sets;
@@ -45,10 +46,13 @@ pub struct Build {
     pub tracer: String,
     /// Threads allowed.
     pub threads: usize,
-    /// On the wall, the best of some.
+    /// On the wall, the least of some.
     pub seconds: f64,
-    /// All threads.
+    /// All threads, the least of some.
     pub cpu_seconds: f64,
+    /// Of them those of other threads than the one that asked; none: measured before they were told apart, and "1 thread" may have been two.
+    #[serde(default)]
+    pub helped_seconds: Option<f64>,
     /// Nodes and leaves.
     pub memory_bytes: usize,
 }
@@ -58,6 +62,9 @@ pub struct Build {
 pub struct Report {
     /// Where and when.
     pub machine: Machine,
+    /// Which libraries of Embree.
+    #[serde(default)]
+    pub embrees: Vec<String>,
     /// Passes over each set.
     pub passes: usize,
     /// Rates.
@@ -100,8 +107,42 @@ fn different(truth: &[f32], found: &[f32]) -> usize {
     truth.iter().zip(found).filter(|&(a, b)| apart((a, b))).count()
 }
 
+/// Who builds, by name: ours, or a library of Embree.
+pub type Builder = (String, Option<PathBuf>);
+
+/// Embree as it is here.
+pub struct Embrees {
+    /// Those that could be loaded.
+    pub libraries: Vec<embree::Embree>,
+    /// Irradiant and they.
+    pub builders: Vec<Builder>,
+    /// What they call themselves, and the files that they are in.
+    pub versions: Vec<String>,
+    /// What is not here.
+    pub missing: Vec<String>,
+}
+
+/// Loads all that there are.
+pub fn embrees(setting: &Setting) -> Embrees {
+    let (paths, missing) = libraries(setting);
+    let builders = vec![("Irradiant".into(), None)];
+    let mut all = Embrees { libraries: vec![], builders, versions: vec![], missing };
+    for path in paths {
+        match embree::Embree::load(&path) {
+            Ok(embree) => {
+                let file = path.file_name().unwrap_or_default().to_string_lossy();
+                all.versions.push(format!("Embree {} (`{file}`)", embree.version()));
+                all.builders.push((format!("Embree {}", embree.major), Some(path)));
+                all.libraries.push(embree);
+            }
+            Err(why) => all.missing.push(why),
+        }
+    }
+    all
+}
+
 /// Libraries of Embree that there are: 4 from the wheel, 3 from Debian.
-pub fn libraries(setting: &Setting) -> (Vec<PathBuf>, Vec<String>) {
+fn libraries(setting: &Setting) -> (Vec<PathBuf>, Vec<String>) {
     let (mut found, mut missing) = (Vec::new(), Vec::new());
     let wheel = setting.peers.as_ref().and_then(|peers| {
         let packages = std::fs::read_dir(peers.join("embree/lib")).ok()?;
@@ -128,40 +169,40 @@ pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> R
 }
 
 fn on_subject(
-    subject: &Subject,
+    (scene, subject): (&str, &Subject),
     embrees: &[embree::Embree],
+    builders: &[Builder],
     passes: usize,
     width: usize,
     report: &mut Report,
 ) -> Result<(), String> {
     let geometry = &subject.geometry;
     println!("{}: {} triangles", subject.name, geometry.triangles());
-    let mut say = |tracer: &str, threads: usize, seconds: f64, cpu_seconds: f64, memory_bytes: usize| {
-        let mb = memory_bytes as f64 / 1e6;
-        println!("  build {tracer:20} {threads} thread(s): {seconds:6.3} s, {cpu_seconds:6.3} CPU s, {mb:6.1} MB");
-        report.builds.push(Build {
-            scene: subject.name.into(),
-            triangles: geometry.triangles(),
-            tracer: tracer.into(),
-            threads,
-            seconds,
-            cpu_seconds,
-            memory_bytes,
-        });
-    };
-    // Each build twice, the quicker one counts.
-    let quicker = |a: (f64, f64), b: (f64, f64)| if a.1 < b.1 { a } else { b };
     for threads in [1, 2] {
-        let build = || on_threads(threads, || ours::Tree::build(geometry));
-        let (a, b) = (build()?, build()?);
-        let (seconds, cpu) = quicker((a.seconds, a.cpu_seconds), (b.seconds, b.cpu_seconds));
-        say("Irradiant", threads, seconds, cpu, a.memory_bytes());
-        for e in embrees {
-            for robust in [false, true] {
-                let (a, b) = (e.build(geometry, robust, threads)?, e.build(geometry, robust, threads)?);
-                let (seconds, cpu) = quicker((a.seconds, a.cpu_seconds), (b.seconds, b.cpu_seconds));
-                let name = format!("Embree {}{}", e.major, if robust { " robust" } else { "" });
-                say(&name, threads, seconds, cpu, a.memory_bytes());
+        for (found, (tracer, _)) in builds::by_turns(scene, threads, builders, passes).into_iter().zip(builders) {
+            match found {
+                Ok(builds::Once { spent, memory_bytes }) => {
+                    println!(
+                        "  build {tracer:20} {threads} thread(s): {:6.3} s, {:6.3} CPU s, {:6.1} MB",
+                        spent.seconds,
+                        spent.cpu_seconds,
+                        memory_bytes as f64 / 1e6
+                    );
+                    report.builds.push(Build {
+                        scene: subject.name.into(),
+                        triangles: geometry.triangles(),
+                        tracer: tracer.clone(),
+                        threads,
+                        seconds: spent.seconds,
+                        cpu_seconds: spent.cpu_seconds,
+                        helped_seconds: Some(spent.helped_seconds),
+                        memory_bytes,
+                    });
+                }
+                Err(why) => {
+                    println!("  left out: {why}");
+                    report.missing.push(why);
+                }
             }
         }
     }
@@ -244,19 +285,13 @@ fn on_subject(
 
 /// Measures on all three scenes and prints as it goes.
 pub fn run(passes: usize, width: usize, setting: &Setting) -> Result<Report, String> {
-    let (libraries, mut missing) = libraries(setting);
-    let mut embrees = Vec::new();
-    for path in &libraries {
-        match embree::Embree::load(path) {
-            Ok(e) => embrees.push(e),
-            Err(why) => missing.push(why),
-        }
-    }
+    let Embrees { libraries, builders, versions, missing } = embrees(setting);
     missing.iter().for_each(|m| println!("left out: {m}"));
     let machine = Machine::here(&setting.repository, false);
-    let mut report = Report { machine, passes, rates: vec![], builds: vec![], missing };
-    for subject in [sets::objects(), sets::displaced(708), sets::instances()] {
-        on_subject(&subject, &embrees, passes, width, &mut report)?;
+    let mut report = Report { machine, embrees: versions, passes, rates: vec![], builds: vec![], missing };
+    for scene in ["objects", "displaced-708", "instances"] {
+        let subject = sets::by_name(scene).ok_or("no such scene")?;
+        on_subject((scene, &subject), &libraries, &builders, passes, width, &mut report)?;
     }
     Ok(report)
 }

@@ -1,12 +1,11 @@
 //! Irradiant's tree over the same geometry.
 
+use super::builds::{Spent, Stopwatch};
 use super::sets::{Geometry, Placement};
 use crate::vector::{V, add, scale, sub};
-use cpu_time::ProcessTime;
 use irradiant_bvh::{
     Braid, BuildInput, BuildSettings, Bvh, Closest, Hit, Leaves, Level, Mesh, Part, Ray, TrianglesOnly, braid,
 };
-use std::time::Instant;
 
 /// A tree over triangles, or one over instances of such.
 pub struct Tree<'a> {
@@ -16,10 +15,8 @@ pub struct Tree<'a> {
     placed: Vec<Placed>,
     top: Option<Bvh>,
     level: Level,
-    /// Of the build, on the wall.
-    pub seconds: f64,
-    /// Of the build, all threads.
-    pub cpu_seconds: f64,
+    /// By the build.
+    pub spent: Spent,
 }
 
 /// An instance, or a part of one, as the tree over them knows it.
@@ -112,7 +109,7 @@ impl<'a> Tree<'a> {
     /// Builds on the current pool of threads.
     pub fn build(geometry: &'a Geometry) -> Self {
         let settings = BuildSettings::default();
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let watch = Stopwatch::start();
         let over = |meshes: &[Mesh]| Bvh::build(&BuildInput { meshes, user_boxes: &[] }, &settings);
         let meshes: Vec<Mesh> = geometry.meshes.iter().map(mesh_of).collect();
         let (parts, placed, top) = if geometry.placements.is_empty() {
@@ -139,8 +136,7 @@ impl<'a> Tree<'a> {
             let top = Bvh::build(&BuildInput { meshes: &[], user_boxes: &boxes }, &settings);
             (parts, placed, Some(top))
         };
-        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-        Self { geometry, parts, placed, top, level: Level::detect(), seconds, cpu_seconds }
+        Self { geometry, parts, placed, top, level: Level::detect(), spent: watch.spent() }
     }
 
     /// Bytes of nodes and leaves, and of placements where there are any.

@@ -55,6 +55,15 @@ pub struct Subject {
     lamp: [V; 3],
 }
 
+/// "objects", "instances", or "displaced-N" for [`displaced`] of N.
+pub fn by_name(name: &str) -> Option<Subject> {
+    match name {
+        "objects" => Some(objects()),
+        "instances" => Some(instances()),
+        _ => Some(displaced(name.strip_prefix("displaced-")?.parse().ok()?)),
+    }
+}
+
 fn room(size: f32, height: f32) -> Mesh {
     let mut mesh = Mesh::default();
     mesh.add_box([-size, 0.0, -size], [size, height, size], false);
