@@ -174,14 +174,21 @@ fn street_section(r: &street::Report, folder: &Path) -> Result<String, String> {
     );
     out += &where_measured(&r.machine);
     out += &missing(&r.missing);
-    out += "| renderer | spp | relMSE | CPU s | Mpaths per CPU s | load | version |\n|---|---|---|---|---|---|---|\n";
+    out += "| renderer | spp | pictures | relMSE | CPU s | Mpaths per CPU s | load | version |\n|---|---|---|---|---|---|---|---|\n";
     let pixels = f64::from(r.resolution[0] * r.resolution[1]);
     for p in &r.points {
         let rate = pixels * f64::from(p.spp) / p.cpu_seconds / 1e6;
         let _ = writeln!(
             out,
-            "| {} | {} | {:.5} | {:.2} | {rate:.3} | {:.1} | {} |",
-            p.name, p.spp, p.error, p.cpu_seconds, p.load, p.version
+            "| {} | {} | {} | {:.5}{} | {:.2} | {rate:.3} | {:.1} | {} |",
+            p.name,
+            p.spp,
+            p.pictures,
+            p.error,
+            p.uncertainty.map_or(String::new(), |u| format!(" +- {u:.5}")),
+            p.cpu_seconds,
+            p.load,
+            p.version
         );
     }
     let at16 = r.points.iter().find(|p| p.name == "Irradiant rgb" && p.spp == 16).map_or(f64::NAN, |p| p.cpu_seconds);
@@ -190,6 +197,17 @@ fn street_section(r: &street::Report, folder: &Path) -> Result<String, String> {
         _ => "a smaller picture than that of the goal".into(),
     };
     let _ = writeln!(out, "\n16 paths per pixel: {at16:.1} CPU s; {}.", judged(at16, 12.0));
+    if let Some(two) = &r.on_two {
+        let (seconds, verdict) = (two.seconds, judged(two.seconds, 6.0));
+        let _ = writeln!(
+            out,
+            "On {} threads: {seconds:.1} s on the wall ({:.1} CPU s, load before {:.1}); {verdict}; {:.0} times the paths per second of the lecture's machine.",
+            two.threads,
+            two.cpu_seconds,
+            two.load,
+            18.0 * 60.0 / seconds
+        );
+    }
     let curves = [
         ("path", r.equal_error_spp, r.equal_error_cpu_seconds),
         ("sharedpath", r.shared_equal_error_spp, r.shared_equal_error_cpu_seconds),

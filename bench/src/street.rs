@@ -1,13 +1,14 @@
 //! The street: what 16 paths per pixel cost, how the error falls, and what the error of 16 independent samples costs.
 
 use crate::Setting;
-use crate::contestant::Contestant;
+use crate::contestant::{Contestant, Irradiant};
 use crate::machine::{Machine, load};
 use crate::peers::{self, Contestants};
 use crate::picture::{Mask, Picture, Truth, write_half_size};
 use crate::pictures::{reference, write_scene};
 use crate::scene;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// How much to render.
 #[derive(Clone, Copy, Debug)]
@@ -20,22 +21,52 @@ pub struct Amount {
     pub shrink: u32,
 }
 
-/// One render.
+/// Pictures of one kind.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Point {
     /// Who rendered.
     pub name: String,
     /// Samples per pixel.
     pub spp: u32,
-    /// relMSE.
+    /// Pictures, each of its own seed.
+    #[serde(default = "one")]
+    pub pictures: u32,
+    /// relMSE, the mean over pictures.
     pub error: f64,
-    /// CPU seconds.
+    /// Standard error of that mean, if there are pictures enough to tell.
+    #[serde(default)]
+    pub uncertainty: Option<f64>,
+    /// CPU seconds, the mean over pictures.
     pub cpu_seconds: f64,
     /// Load of the machine before.
     pub load: f64,
     /// Name and version.
     #[serde(default)]
     pub version: String,
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// Pictures of a number of samples: a few samples leave an error that differs from seed to seed, half of which lies in one pixel of a hundred.
+fn pictures(spp: u32) -> u32 {
+    (8 / spp).max(1)
+}
+
+/// What a picture takes on a number of threads.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct OnThreads {
+    /// How many.
+    pub threads: usize,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Seconds on the wall, without loading and building.
+    pub seconds: f64,
+    /// CPU seconds.
+    pub cpu_seconds: f64,
+    /// Load of the machine before.
+    pub load: f64,
 }
 
 /// All of it.
@@ -69,6 +100,9 @@ pub struct Report {
     /// The same by shared paths.
     #[serde(default)]
     pub shared_equal_error_cpu_seconds: Option<f64>,
+    /// 16 paths per pixel on two threads.
+    #[serde(default)]
+    pub on_two: Option<OnThreads>,
     /// What was left out.
     pub missing: Vec<String>,
 }
@@ -128,20 +162,24 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
             }
             let out = folder.join(format!("{}-{spp}.pfm", name.replace(' ', "-")));
             let before = load();
-            let cost = contestant.render(spp, 1, &out)?;
+            let (mut errors, mut cpu_seconds) = (Vec::new(), 0.0);
+            for seed in 1..=pictures(spp) {
+                cpu_seconds += contestant.render(spp, seed, &out)?.cpu_seconds / f64::from(pictures(spp));
+                errors.push(truth.relative_error(&Picture::read(&out)?));
+            }
             if name == "Irradiant rgb" && spp == 16 {
                 write_half_size(&out, &setting.results.join("street.jpg"), 1.3)?;
             }
-            let error = truth.relative_error(&Picture::read(&out)?);
-            let rate = scene.pixels() as f64 * f64::from(spp) / cost.cpu_seconds / 1e6;
+            let (error, uncertainty) = mean_and_its_error(&errors);
+            let rate = scene.pixels() as f64 * f64::from(spp) / cpu_seconds / 1e6;
             println!(
-                "  {name:22} {spp:3} spp: relMSE {error:.5}, {:6.2} CPU s, {rate:6.3} Mpaths/CPU s, load {before:.1}",
-                cost.cpu_seconds
+                "  {name:22} {spp:3} spp: relMSE {error:.5}, {cpu_seconds:6.2} CPU s, {rate:6.3} Mpaths/CPU s, load {before:.1}",
             );
-            let version = contestant.version();
-            points.push(Point { name: name.clone(), spp, error, cpu_seconds: cost.cpu_seconds, load: before, version });
+            let (name, version, pictures) = (name.clone(), contestant.version(), pictures(spp));
+            points.push(Point { name, spp, pictures, error, uncertainty, cpu_seconds, load: before, version });
         }
     }
+    let on_two = on_threads(2, setting, &folder)?;
     let find = |name: &str| points.iter().filter(|p| p.name == name).collect::<Vec<_>>();
     let independent_error = find("Irradiant independent").first().map_or(f64::NAN, |p| p.error);
     let crossed_by = |name: &str| {
@@ -163,13 +201,37 @@ pub fn run(amount: &Amount, setting: &Setting) -> Result<Report, String> {
         equal_error_cpu_seconds: crossed.map(|c| c.1),
         shared_equal_error_spp: shared.map(|c| c.0),
         shared_equal_error_cpu_seconds: shared.map(|c| c.1),
+        on_two: Some(on_two),
         missing,
     })
 }
 
+fn mean_and_its_error(errors: &[f64]) -> (f64, Option<f64>) {
+    let n = errors.len() as f64;
+    let mean = errors.iter().sum::<f64>() / n;
+    let square = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
+    (mean, (n > 1.0).then(|| (square / (n - 1.0) / n).sqrt()))
+}
+
+/// 16 paths per pixel, whatever the number of threads that everybody else has.
+fn on_threads(threads: usize, setting: &Setting, folder: &Path) -> Result<OnThreads, String> {
+    let (spp, load) = (16, load());
+    let mut ours = Irradiant::new(&setting.irradiant, &folder.join("scene.pbrt"), threads, &["--color", "rgb"]);
+    let cost = ours.render(spp, 1, &folder.join(format!("on-{threads}-threads.pfm")))?;
+    println!("  {threads} threads: {:.2} s on the wall, {:.2} CPU s, load {load:.1}", cost.seconds, cost.cpu_seconds);
+    Ok(OnThreads { threads, spp, seconds: cost.seconds, cpu_seconds: cost.cpu_seconds, load })
+}
+
 #[cfg(test)]
 mod tests {
-    use super::crossing;
+    use super::{crossing, mean_and_its_error};
+
+    #[test]
+    fn means_have_errors_where_there_are_two() {
+        assert_eq!(mean_and_its_error(&[3.0]), (3.0, None));
+        let (mean, error) = mean_and_its_error(&[1.0, 3.0]);
+        assert!(mean == 2.0 && (error.unwrap() - 1.0).abs() < 1e-12);
+    }
 
     #[test]
     fn the_crossing_of_a_power_law_is_exact() {
