@@ -74,7 +74,7 @@ impl RayBatch {
 
 impl Geometry {
     /// What [`Geometry::intersect`] gives for each ray of a batch, to the bit. Of rays that go anywhere (`scattered`: bounces) those of large trees
-    /// are traced one by one.
+    /// are traced one by one, in the order of their directions.
     ///
     /// # Panics
     /// If there is not one of `hits` for each ray.
@@ -90,8 +90,9 @@ impl Geometry {
         let leaves = GroupLeaves { geometry: self, group, alpha };
         let RayBatch { rays, closest, .. } = batch;
         if scattered && !self.sorts_rays() {
-            for (ray, hit) in rays.iter().zip(hits) {
-                *hit = group.tree.intersect(self.level, ray, &leaves).map(hit_of);
+            for &i in by_direction(&rays[..hits.len()], &mut [0; LANES]) {
+                let i = usize::from(i);
+                hits[i] = group.tree.intersect(self.level, &rays[i], &leaves).map(hit_of);
             }
             return;
         }
@@ -108,5 +109,70 @@ impl Geometry {
         let leaves = GroupLeaves { geometry: self, group, alpha };
         let RayBatch { n, rays, blocked, .. } = batch;
         group.tree.occluded_batch(self.level, &rays[..*n], &leaves, &mut blocked[..*n]);
+    }
+}
+
+/// Cells of directions: eight by eight of each octant.
+const CELLS: usize = 8 << 6;
+
+/// The rays' indices in an order in which those that go alike follow each other: boxes that one has met, and what it was told at branches, are then still
+/// at hand for the next.
+///
+/// On Granite Rapids, beside much other work, by turns: the street 0.92 to 0.965 of the time, an interior 1.00. By octant, origin (64 cells), direction: 0.93; by
+/// origin, direction: 1.07. Shadow rays by direction 1.12: those of neighbouring pixels no longer go in packets.
+fn by_direction<'a>(rays: &[bvh::Ray], order: &'a mut [u16; LANES]) -> &'a [u16] {
+    let (mut cells, mut places) = ([0u16; LANES], [0u16; CELLS + 1]);
+    for (cell, ray) in cells.iter_mut().zip(rays) {
+        *cell = cell_of(ray.d);
+        places[usize::from(*cell) + 1] += 1;
+    }
+    for cell in 0..CELLS {
+        places[cell + 1] += places[cell];
+    }
+    for (i, &cell) in (0..).zip(&cells[..rays.len()]) {
+        let place = &mut places[usize::from(cell)];
+        order[usize::from(*place)] = i;
+        *place += 1;
+    }
+    &order[..rays.len()]
+}
+
+/// The cell of a direction of any length; any cell for one that is none.
+#[inline(always)]
+fn cell_of([x, y, z]: [f32; 3]) -> u16 {
+    let octant = u16::from(x < 0.0) | u16::from(y < 0.0) << 1 | u16::from(z < 0.0) << 2;
+    // Steps of one eighth along two axes of the octahedron. What is no number becomes 0.
+    let scale = 7.99 / (x.abs() + y.abs() + z.abs());
+    let (row, column) = ((x.abs() * scale) as u16 & 7, (y.abs() * scale) as u16 & 7);
+    // There and back again, so that neighbours in the order are neighbours.
+    let column = if row & 1 == 0 { column } else { 7 - column };
+    octant << 6 | row << 3 | column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_are_all_traced_once_whatever_their_directions() {
+        let mut state = 1u32;
+        let mut number = || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let odd = [0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3e38, -1e-45];
+        for n in [0, 1, 7, LANES] {
+            let ray = |i: usize| {
+                let d = std::array::from_fn(|axis| if i % 3 == 0 { odd[(i / 3 + axis) % odd.len()] } else { number() });
+                bvh::Ray { o: [0.0; 3], t_max: 1.0, d, time: 0.0 }
+            };
+            let rays: Vec<_> = (0..n).map(ray).collect();
+            let mut order = [0; LANES];
+            let mut sorted = by_direction(&rays, &mut order).to_vec();
+            let cells: Vec<_> = sorted.iter().map(|&i| cell_of(rays[usize::from(i)].d)).collect();
+            assert!(cells.is_sorted() && cells.iter().all(|&cell| usize::from(cell) < CELLS));
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..n as u16));
+        }
     }
 }
