@@ -1,6 +1,7 @@
 //! Flags that several subcommands share, and how their values are read.
 
 use clap::Args;
+use irradiant::scene::desc::{Randomization, SamplerKind};
 use irradiant::{ColorMode, IntegratorChoice, MaxDepth, RenderSettings};
 use std::time::Duration;
 
@@ -13,6 +14,9 @@ pub struct PictureOptions {
     /// Seed of the random numbers; pictures of different seeds are independent
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: Option<u64>,
+    /// Where random numbers come from [default: the scene's]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub sampler: Option<SamplerName>,
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", allow_hyphen_values = true, value_parser = parse_resolution)]
     pub resolution: Option<[u32; 2]>,
@@ -48,6 +52,37 @@ pub enum Color {
     Rgb,
 }
 
+/// `--sampler`: pbrt-v4's that need no numbers of their own.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum SamplerName {
+    /// Owen-scrambled Sobol points along a curve over the picture: errors of neighbours cancel (blue noise)
+    Zsobol,
+    /// Owen-scrambled Sobol points for each pixel by itself: errors of neighbours are independent
+    Paddedsobol,
+    /// Independent numbers
+    Independent,
+    /// Halton points
+    Halton,
+    /// One Sobol sequence over the picture
+    Sobol,
+    /// Pairs of Sobol points
+    Pmj02bn,
+}
+
+impl SamplerName {
+    /// As scenes have it, where they say no more than the name.
+    pub fn kind(self) -> SamplerKind {
+        match self {
+            Self::Zsobol => SamplerKind::ZSobol,
+            Self::Paddedsobol => SamplerKind::PaddedSobol(Randomization::FastOwen),
+            Self::Independent => SamplerKind::Independent,
+            Self::Halton => SamplerKind::Halton(Randomization::PermuteDigits),
+            Self::Sobol => SamplerKind::Sobol(Randomization::FastOwen),
+            Self::Pmj02bn => SamplerKind::Pmj02bn,
+        }
+    }
+}
+
 /// Fractions x0, x1, y0, y1.
 #[derive(Clone, Copy, Debug)]
 pub struct Crop(pub [f32; 4]);
@@ -63,6 +98,7 @@ impl PictureOptions {
         RenderSettings {
             samples_per_pixel: self.spp,
             seed: self.seed,
+            sampler: self.sampler.map(SamplerName::kind),
             resolution: self.resolution,
             crop: self.crop.map(|c| c.0),
             integrator: match &self.integrator {

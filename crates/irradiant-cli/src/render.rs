@@ -10,6 +10,7 @@ use clap::Args;
 use irradiant::image::FileFormat;
 use irradiant::renderer::Progress;
 use irradiant::renderer::inspect::{AuditSettings, AuditWatch, EnergyAudit, watched_audit};
+use irradiant::scene::desc::SamplerKind;
 use irradiant::{Aov, Error, IntegratorChoice, Job, MaxDepth, Rendering, SceneFile};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -50,7 +51,7 @@ pub struct RenderArguments {
     /// Write the picture and its layers, small and labelled, on one sheet
     #[arg(long, value_name = "FILE.png")]
     contact_sheet: Option<PathBuf>,
-    /// A quick look: a quarter of the pixels, at most 16 samples each; --resolution and --spp stay as they are said
+    /// A quick look: a quarter of the pixels, at most 16 samples each, by zsobol; --resolution, --spp and --sampler stay as they are said
     #[arg(long)]
     preview: bool,
     /// Write seconds, CPU seconds, rays, memory as JSON
@@ -138,6 +139,8 @@ fn render(arguments: &RenderArguments) -> Result<Exit, Error> {
     if arguments.preview {
         settings.resolution.get_or_insert(file.desc.film.resolution.value.map(|n| (n / 2).max(1)));
         settings.samples_per_pixel.get_or_insert(file.desc.sampler.samples_per_pixel.value.min(16));
+        // Blue noise: a sixth to a half less of what is left when an eye blurs the picture (decision 7).
+        settings.sampler.get_or_insert(SamplerKind::ZSobol);
     }
     let job = Job::new(&file, &settings)?;
     clock.lap("compile");
@@ -508,6 +511,9 @@ fn replay_flags(rendering: &Rendering, arguments: &RenderArguments) -> String {
     if picture.resolution.is_some() || arguments.preview {
         let [width, height] = rendering.film.full_resolution();
         flags += &format!(" --resolution {width}x{height}");
+    }
+    if picture.sampler.is_some() || arguments.preview {
+        flags += &format!(" --sampler {}", rendering.header.sampler);
     }
     if picture.integrator.is_some() {
         flags += " --integrator path";

@@ -331,7 +331,12 @@ fn refused_samples_are_told_with_commands_that_replay_them() {
         assert!(stderr(&output).contains("samples were not finite or out of range"), "{}", stderr(&output));
         stderr(&output)
     };
-    for words in [&[][..], &["--integrator", "path", "--estimator", "roulette=constant", "--max-depth", "3"]] {
+    for words in [
+        &[][..],
+        &["--integrator", "path", "--estimator", "roulette=constant", "--max-depth", "3"],
+        &["--preview"],
+        &["--sampler", "halton"],
+    ] {
         let said = render(words);
         let commands: Vec<&str> = said.lines().filter_map(|l| l.trim().strip_prefix("irradiant ")).collect();
         assert!(!commands.is_empty(), "{said}");
@@ -568,6 +573,27 @@ fn a_preview_is_small_but_for_what_is_said() {
 }
 
 #[test]
+fn a_preview_has_blue_noise_whatever_the_scene_says() {
+    let folder = Folder::new("preview-sampler");
+    folder.write("a.pbrt", &format!("Sampler \"halton\"\n{SCENE}"));
+    folder.write("b.pbrt", &format!("Sampler \"zsobol\"\n{SCENE}"));
+    let picture = |flags: &[&str]| {
+        let output = folder.run(&[&["render", "--quiet", "--spp", "2", "-o", "x.pfm"], flags].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        let bytes = std::fs::read(folder.0.join("x.pfm")).expect("written");
+        std::fs::remove_file(folder.0.join("x.pfm")).expect("removed");
+        bytes
+    };
+    let blue = picture(&["b.pbrt", "--preview"]);
+    assert_eq!(picture(&["a.pbrt", "--preview"]), blue);
+    assert_eq!(picture(&["a.pbrt", "--preview", "--sampler", "zsobol"]), blue);
+    let independent = picture(&["a.pbrt", "--preview", "--sampler", "independent"]);
+    assert_ne!(independent, blue);
+    assert_eq!(picture(&["b.pbrt", "--preview", "--sampler", "independent"]), independent);
+    assert_ne!(picture(&["a.pbrt"]), picture(&["b.pbrt"]));
+}
+
+#[test]
 fn a_crop_is_compared_with_the_whole_where_both_are() {
     let folder = Folder::new("part");
     for (crop, name) in [("0,1,0,1", "all.exr"), ("0.5,1,0.25,1", "part.exr"), ("0,0.25,0,1", "left.exr")] {
@@ -664,6 +690,7 @@ fn versions_and_help_are_there() {
         "--spp",
         "--time",
         "--seed",
+        "--sampler",
         "--threads",
         "--resolution",
         "--crop",

@@ -570,7 +570,8 @@ pub const SURVIVAL_RULE: &str = "1 after the first event; later twice the larges
 ///
 /// 64 samples per pixel of a Cornell box in RGB, error (relMSE) times CPU time against 1: roulette below 1 (as pbrt-v4)
 /// 1.00; below 1/2 0.65; below 1/4 0.63; by the square root of the throughput 0.75; none for one event more 0.85, for
-/// three more 0.74. Nearer to 1 is cheaper a sample, which matters where paths end early anyway.
+/// three more 0.74. Nearer to 1 is cheaper a sample, which matters where paths end early anyway. By stages, and in the benchmark's other four
+/// scenes: decision 7.
 const ROULETTE_BELOW: f32 = 0.5;
 
 /// Chance to go on: the largest throughput, with the scale of [`Walk`] for roulette, over [`ROULETTE_BELOW`]; 1 for the first two

@@ -54,6 +54,7 @@ impl Job {
             crop: settings.crop,
             samples_per_pixel: settings.samples_per_pixel,
             seed: settings.seed,
+            sampler: settings.sampler,
             light_sampler: integrator.light_sampler(),
             splats: integrator.integrator(max_depth).splats(),
             max_film_bytes: settings.max_film_bytes.unwrap_or(CompileOptions::MAX_FILM_BYTES),

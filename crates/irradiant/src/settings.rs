@@ -2,6 +2,7 @@
 
 use crate::aov::Aov;
 use irradiant_render::registry::IntegratorChoice;
+use irradiant_scene::desc::SamplerKind;
 use std::time::Duration;
 
 /// The basis of colour.
@@ -33,6 +34,8 @@ pub struct RenderSettings {
     pub time_limit: Option<Duration>,
     /// Seed of the random numbers.
     pub seed: Option<u64>,
+    /// Where they come from.
+    pub sampler: Option<SamplerKind>,
     /// Worker threads; 0: one per core.
     pub threads: usize,
     /// Width and height, pixels.

@@ -132,7 +132,8 @@ impl Ggx {
 
     /// A direction reflected off a facet, density [`Ggx::bounded_pdf`]; `None` if it passes under the horizon.
     ///
-    /// Like [`Ggx::sample_visible`], leaving out most normals whose reflection would be lost. On the side of `w`.
+    /// Like [`Ggx::sample_visible`], leaving out most normals whose reflection would be lost. On the side of `w`. Error x time against
+    /// visible normals: white furnace of metals of alpha 0.1 to 1 0.9, a million triangles 0.94, plates and interior (smooth) 1 (decision 7).
     #[inline]
     pub fn sample_bounded_reflection(&self, w: Vec3, u: Point2) -> Option<Vec3> {
         let (wi, is_above) = self.bounded_reflection(w, u);

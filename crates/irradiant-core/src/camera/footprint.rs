@@ -13,7 +13,8 @@ const MOST_CHANGE: f32 = 1e8;
 /// Where the camera's own ray meets a surface, its neighbours are intersected with the tangent plane (Igehy 1999). Elsewhere
 /// it is what the sharpest part of the camera would see of that point from where it stands, however the path came there
 /// (Pharr, Jakob and Humphreys 2023, section 10.1.1): about right after flat mirrors, too sharp after rough scattering,
-/// and free of state along the path. Footprints shrink with the number of samples, by 1 / sqrt(n), at most by 8.
+/// and free of state along the path. Footprints shrink with the number of samples, by 1 / sqrt(n), at most by 8. What filtering by them saves and
+/// how far it blurs: decision 7.
 #[derive(Clone, Debug)]
 pub struct FootprintEstimator {
     /// The camera's position in render space, where it rests.

@@ -85,6 +85,8 @@ fn brightness(rgb: [f32; 3]) -> f32 {
 impl PixelDensity {
     /// In proportion to brightness; if `compensated`, to what of it exceeds the mean (equal if nothing does).
     ///
+    /// Error x time by `path` of a million triangles 0.4, of the benchmark's street 0.84 of what it is without compensation (decision 7).
+    ///
     /// `None` for an image without pixels. All-black images have density 0.
     pub fn new(image: &RadianceImage, compensated: bool) -> Option<Self> {
         let (width, height) = (image.width(), image.height());

@@ -222,7 +222,9 @@ impl Sampler {
             }
             SamplerKind::Pmj02bn => Source::Pairs { index, seed: pixel_seed() },
             // Ahmed and Wonka 2020: consecutive runs of the sequence along a Morton curve over the image, so that
-            // neighbouring pixels' errors cancel. The nested shuffle is base 2 here (theirs is base 4).
+            // neighbouring pixels' errors cancel. The nested shuffle is base 2 here. Theirs in base 4 pairs pixels in all three ways at random, also
+            // by the diagonal: of independent samples' error after a Gaussian of 1 pixel 0.46, 0.160, 0.081 are left with 1, 4, 16 samples where base 2
+            // leaves 0.42, 0.155, 0.079 (decision 7, with pictures and what OpenQMC's tables leave). A Hilbert curve instead of Morton's: 0.425, 0.155, 0.077.
             SamplerKind::ZSobol => {
                 let along = morton_encode_2(x & 0xffff, y & 0xffff) as u64;
                 let index = (along << self.log2_samples) + index as u64;

@@ -33,6 +33,8 @@ pub struct CompileOptions {
     pub samples_per_pixel: Option<u32>,
     /// Seed.
     pub seed: Option<u64>,
+    /// Where random numbers come from.
+    pub sampler: Option<SamplerKind>,
     /// How lights are picked.
     pub light_sampler: Option<LightSamplerKind>,
     /// Whether paths from lights will bring something to the film, for which it takes memory.
@@ -54,6 +56,7 @@ impl Default for CompileOptions {
             crop: None,
             samples_per_pixel: None,
             seed: None,
+            sampler: None,
             light_sampler: None,
             splats: false,
             max_film_bytes: Self::MAX_FILM_BYTES,
@@ -104,6 +107,7 @@ fn compile(
     check_filter(desc, diagnostics);
     check_buckets(&film, diagnostics);
     let samples_per_pixel = options.samples_per_pixel.unwrap_or(desc.sampler.samples_per_pixel.value).max(1);
+    let sampler = options.sampler.unwrap_or(desc.sampler.kind);
     let seed = options.seed.or(desc.sampler.seed).unwrap_or(desc.options.seed);
     let space = color_space(film.color_space);
 
@@ -153,7 +157,7 @@ fn compile(
     if desc.options.disable_wavelength_jitter && options.basis == Basis::Spectral {
         biases.push("disablewavelengthjitter".into());
     }
-    match desc.sampler.kind {
+    match sampler {
         SamplerKind::Stratified { jitter: false, .. }
         | SamplerKind::Halton(Randomization::None)
         | SamplerKind::Sobol(Randomization::None)
@@ -175,7 +179,7 @@ fn compile(
         lights,
         camera,
         filter: Filter::new(&desc.filter),
-        sampler: Sampler::new(desc.sampler.kind, samples_per_pixel, film.resolution.value, seed),
+        sampler: Sampler::new(sampler, samples_per_pixel, film.resolution.value, seed),
         layers,
         labels: Labels::new(desc),
         samples_per_pixel,
