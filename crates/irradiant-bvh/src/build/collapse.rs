@@ -50,18 +50,10 @@ pub(crate) fn collapse(
     tree: &[binary::Node],
     refs: Vec<Ref>,
     input: &BuildInput,
+    starts: &[u32],
     settings: &BuildSettings,
     mut report: BuildReport,
 ) -> Bvh {
-    let starts: Vec<u32> = input
-        .meshes
-        .iter()
-        .scan(0u32, |sum, m| {
-            let first = *sum;
-            *sum += m.triangles.len() as u32;
-            Some(first)
-        })
-        .collect();
     let root = &tree[0];
     let extent = (0..3).map(|a| f64::from(root.hi[a]) - f64::from(root.lo[a])).fold(0.0, f64::max);
     let plan = Plan {
@@ -69,7 +61,7 @@ pub(crate) fn collapse(
         refs: &refs,
         settings,
         scale: if extent > 0.0 { 1.0 / extent } else { 0.0 },
-        per_block: pack::triangles_per_block(&refs, input, &starts),
+        per_block: pack::triangles_per_block(&refs, input, starts),
         block_cost: settings.block_cost * if refs.len() > CACHED { FOLLOWING } else { 1.0 },
     };
     let mut choices = vec![[0u8; 8]; tree.len()];
@@ -82,7 +74,7 @@ pub(crate) fn collapse(
     drop(choices);
 
     let packed: Vec<Packed> =
-        layout.leaves.par_chunks(1024).map(|runs| pack::pack(runs, &refs, input, &starts)).collect();
+        layout.leaves.par_chunks(1024).map(|runs| pack::pack(runs, &refs, input, starts)).collect();
     let mut blocks = vec_on_large_pages(packed.iter().map(|p| p.blocks.len()).sum());
     let mut first_blocks: Vec<u32> = Vec::with_capacity(layout.leaves.len());
     for part in packed {

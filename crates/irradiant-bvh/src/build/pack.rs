@@ -64,7 +64,7 @@ impl Filling {
 /// The mesh of a triangle, and its corners.
 fn corners<'a>(reference: &Ref, input: &'a BuildInput, starts: &[u32]) -> (&'a Mesh<'a>, [[f32; 3]; 3]) {
     let id = reference.id();
-    let m = if starts.len() == 1 { 0 } else { starts.partition_point(|&s| s <= id) - 1 };
+    let m = if starts.len() == 1 { 0 } else { gather::mesh_of(id, starts) };
     let mesh = &input.meshes[m];
     // Gathered triangles have sound indices.
     (mesh, gather::vertices(mesh, (id - starts[m]) as usize).unwrap_or_default())
