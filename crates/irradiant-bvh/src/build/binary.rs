@@ -30,7 +30,7 @@ const MAX_BINS: usize = 64;
 /// Subtrees deeper than this are split in halves: it bounds the recursion for boxes whose sizes span hundreds of octaves.
 const MAX_SAH_DEPTH: usize = 64;
 /// Subtrees of this many primitives or fewer are built by one thread, in its cache. Larger ranges are split by all threads, so many primitives at a time.
-const CHUNK: usize = 1 << 14;
+const CHUNK: usize = 1 << 15;
 
 /// How to choose where to split.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,7 +197,7 @@ impl Wide for Subtree<'_> {
     #[inline(always)]
     fn run<E: TwoFours>(self) -> Vec<Node> {
         let Self { refs: all, rules, depth } = self;
-        let mut nodes: Vec<Node> = Vec::with_capacity(all.len() / 2 + 16);
+        let mut nodes: Vec<Node> = Vec::with_capacity(all.len() * 2 / 3 + 16);
         let (mut bins, mut costs) = (Bins::new(), [[0.0; 8]; MAX_BINS]);
         let mut pending = vec![Pending { first: 0, end: all.len(), depth, parent: None }];
         while let Some(Pending { first, end, depth, parent }) = pending.pop() {
@@ -331,19 +331,23 @@ impl Bins {
 
     #[inline(always)]
     fn fill<E: TwoFours>(&mut self, refs: &[Ref], binning: &Binning) {
+        for r in refs {
+            self.put(r.corners::<E>(), binning);
+        }
+    }
+
+    #[inline(always)]
+    fn put<E: TwoFours>(&mut self, corners: E, binning: &Binning) {
         let (origin, scale) = (Native::load(&binning.origin), Native::load(&binning.scale));
         let last = Native::splat((binning.n - 1) as f32);
-        for r in refs {
-            let r = r.corners::<E>();
-            // `min` makes the last bin of a NaN, the product of an infinite distance and a scale of 0; the fourth lane is noise.
-            let bins = ((centre(r).low() - origin) * scale).min(last).round_down();
-            // Masking changes nothing but lets the compiler drop its checks.
-            let bins = bins.map(|bin| bin as usize & (MAX_BINS - 1));
-            for axis in 0..3 {
-                let of_bin = &mut self.boxes[axis][bins[axis]];
-                *of_bin = E::load(of_bin).min(r).to_array();
-                self.counts[bins[axis]][axis] += 1;
-            }
+        // `min` makes the last bin of a NaN, the product of an infinite distance and a scale of 0; the fourth lane is noise.
+        let bins = ((centre(corners).low() - origin) * scale).min(last).round_down();
+        // Masking changes nothing but lets the compiler drop its checks.
+        let bins = bins.map(|bin| bin as usize & (MAX_BINS - 1));
+        for axis in 0..3 {
+            let of_bin = &mut self.boxes[axis][bins[axis]];
+            *of_bin = E::load(of_bin).min(corners).to_array();
+            self.counts[bins[axis]][axis] += 1;
         }
     }
 
@@ -384,8 +388,8 @@ impl Bins {
                 let [lower, upper] = E::halves(below[axis], above[axis]);
                 sizes[axis] = ((lower + upper) * scale).max(zero);
             }
-            let [more_below, more_above] = [i - 1, n - i].map(|bin| Native::from_integers(self.counts[bin]));
-            counts = counts + E::of_halves(more_below, more_above);
+            let (more_below, more_above) = (self.counts[i - 1], self.counts[n - i]);
+            counts = counts + E::of_halves(Native::from_integers(more_below), Native::from_integers(more_above));
             let [x, y, z] = E::transpose(sizes);
             // Area times the number of blocks that as many triangles fill, rounded up: exact for some millions of triangles, and one more or less
             // does not matter where there are more. Infinite, or no number, if nothing is there.
@@ -415,8 +419,16 @@ impl Wide for Fill<'_> {
     type Output = Box<Bins>;
     #[inline(always)]
     fn run<E: TwoFours>(self) -> Box<Bins> {
-        let mut bins = Bins::new();
-        bins.fill::<E>(self.0, self.1);
+        let Self(refs, binning) = self;
+        let (mut bins, mut others) = (Bins::new(), Bins::new());
+        // Neighbours fall into the same bins, and each would wait for the one before it: two go at once, into bins of their own.
+        let (first, second) = refs.split_at(refs.len() / 2);
+        for (a, b) in first.iter().zip(second) {
+            bins.put(a.corners::<E>(), binning);
+            others.put(b.corners::<E>(), binning);
+        }
+        bins.fill::<E>(&second[first.len()..], binning);
+        bins.add(&others, binning.n);
         bins
     }
 }

@@ -27,6 +27,9 @@ const CANDIDATE: f32 = 0.02;
 const CACHED: usize = 1 << 19;
 const FOLLOWING: f32 = 0.25;
 
+/// Leaves whose blocks are filled before they are put together: a few megabytes.
+const WAVE: usize = 1 << 14;
+
 struct Plan<'a> {
     tree: &'a [binary::Node],
     refs: &'a [Ref],
@@ -73,14 +76,18 @@ pub(crate) fn collapse(
     layout.lay_out(&plan, &choices);
     drop(choices);
 
-    let packed: Vec<Packed> =
-        layout.leaves.par_chunks(1024).map(|runs| pack::pack(runs, &refs, input, starts)).collect();
-    let mut blocks = vec_on_large_pages(packed.iter().map(|p| p.blocks.len()).sum());
+    // Room for somewhat more than is expected: memory that is never touched costs nothing.
+    let mut blocks = vec_on_large_pages((1.25 * report.triangles as f32 / plan.per_block) as usize);
     let mut first_blocks: Vec<u32> = Vec::with_capacity(layout.leaves.len());
-    for part in packed {
-        let first_block = blocks.len() as u32;
-        blocks.extend(part.blocks);
-        first_blocks.extend(part.first_blocks.iter().map(|b| b + first_block));
+    // Not all at once: what the threads fill is copied while it is in the cache, and its memory used again.
+    for wave in layout.leaves.chunks(WAVE) {
+        let packed: Vec<Packed> =
+            wave.par_chunks(WAVE / 32).map(|runs| pack::pack(runs, &refs, input, starts)).collect();
+        for part in packed {
+            let first_block = blocks.len() as u32;
+            blocks.extend_from_slice(&part.blocks);
+            first_blocks.extend(part.first_blocks.iter().map(|b| b + first_block));
+        }
     }
     let mut nodes: Vec<Node> = vec_on_large_pages(layout.nodes.len());
     layout
