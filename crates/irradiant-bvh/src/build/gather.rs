@@ -77,23 +77,21 @@ pub(crate) fn gather(input: &BuildInput, starts: &[u32]) -> (Vec<Ref>, BuildRepo
     let total = triangles + input.user_boxes.len();
     let mut refs = vec_on_large_pages(total);
     let any_flaw = AtomicBool::new(false);
-    let one = |mesh: &mut usize, i: usize| {
+    let one = |meshes: &mut Meshes, i: usize| {
         let found = match i.checked_sub(triangles) {
             Some(user) => of_box(&input.user_boxes[user], user as u32),
-            None => {
-                // Neighbours are mostly of the same mesh.
-                if (i as u32) < starts[*mesh] || starts.get(*mesh + 1).is_some_and(|&next| next <= i as u32) {
-                    *mesh = mesh_of(i as u32, starts);
-                }
-                of_triangle(&input.meshes[*mesh], i - starts[*mesh] as usize, i as u32)
-            }
+            None => of_triangle(meshes, i as u32),
         };
         found.unwrap_or_else(|flaw| {
             any_flaw.store(true, Relaxed);
             Ref::flawed(flaw)
         })
     };
-    (0..total).into_par_iter().with_min_len(1 << 12).map_init(|| 0, one).collect_into_vec(&mut refs);
+    (0..total)
+        .into_par_iter()
+        .with_min_len(1 << 12)
+        .map_init(|| Meshes::new(input, starts), one)
+        .collect_into_vec(&mut refs);
     let mut report = BuildReport::default();
     if any_flaw.into_inner() {
         refs.retain(|r| match r.flaw() {
@@ -114,9 +112,29 @@ pub(crate) fn gather(input: &BuildInput, starts: &[u32]) -> (Vec<Ref>, BuildRepo
     (refs, report)
 }
 
-/// The mesh that a triangle of all is in, given where meshes start.
-pub(super) fn mesh_of(id: u32, starts: &[u32]) -> usize {
-    starts.partition_point(|&start| start <= id) - 1
+/// Finds the meshes that triangles are in.
+pub(super) struct Meshes<'a> {
+    meshes: &'a [Mesh<'a>],
+    /// The index of each mesh's first triangle among all.
+    starts: &'a [u32],
+    /// Where the last one was found: neighbours are mostly of the same mesh.
+    last: usize,
+}
+
+impl<'a> Meshes<'a> {
+    pub fn new(input: &'a BuildInput, starts: &'a [u32]) -> Self {
+        Self { meshes: input.meshes, starts, last: 0 }
+    }
+
+    /// The mesh of a triangle, and its index there.
+    #[inline(always)]
+    pub fn find(&mut self, id: u32) -> (&'a Mesh<'a>, usize) {
+        let starts = self.starts;
+        if id < starts[self.last] || starts.get(self.last + 1).is_some_and(|&next| next <= id) {
+            self.last = starts.partition_point(|&start| start <= id) - 1;
+        }
+        (&self.meshes[self.last], (id - starts[self.last]) as usize)
+    }
 }
 
 fn of_box([lo, hi]: &[[f32; 3]; 2], id: u32) -> Result<Ref, Flaw> {
@@ -124,8 +142,8 @@ fn of_box([lo, hi]: &[[f32; 3]; 2], id: u32) -> Result<Ref, Flaw> {
     if (0..3).all(|a| lo[a] <= hi[a]) { Ok(Ref::new(*lo, *hi, id | Ref::USER)) } else { Err(Flaw::BadBox) }
 }
 
-/// Triangle `i` of a mesh, by the name of `id`.
-fn of_triangle(mesh: &Mesh, i: usize, id: u32) -> Result<Ref, Flaw> {
+fn of_triangle(meshes: &mut Meshes, id: u32) -> Result<Ref, Flaw> {
+    let (mesh, i) = meshes.find(id);
     let [a, b, c] = vertices(mesh, i).ok_or(Flaw::BadIndex)?;
     if !(a.iter().chain(&b).chain(&c).all(|x| x.is_finite())) {
         return Err(Flaw::NonFinite);
