@@ -33,6 +33,9 @@ const MAX_SAH_DEPTH: usize = 64;
 /// Subtrees of this many primitives or fewer are built by one thread, in its cache. Larger ranges are split by all threads, so many primitives at a time.
 const CHUNK: usize = 1 << 15;
 
+/// From this many primitives on it pays to fill bins two at a time.
+const MANY: usize = 512;
+
 /// How to choose where to split.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Split {
@@ -85,13 +88,20 @@ impl Extent {
     #[inline(always)]
     fn of<E: TwoFours>(refs: &[Ref]) -> Self {
         let empty = E::splat(f32::INFINITY);
-        let (mut boxes, mut centres) = (empty, empty);
-        for r in refs {
-            let r = r.corners::<E>();
-            boxes = boxes.min(r);
-            centres = centres.min(centre(r));
+        let (mut boxes, mut centres) = ([empty; 2], [empty; 2]);
+        // Two at once, so that one does not wait for the other.
+        let (pairs, last) = refs.as_chunks::<2>();
+        for [a, b] in pairs {
+            let (a, b) = (a.corners::<E>(), b.corners::<E>());
+            boxes = [boxes[0].min(a), boxes[1].min(b)];
+            centres = [centres[0].min(centre(a)), centres[1].min(centre(b))];
         }
-        Self { boxes: boxes.to_array(), centres: centres.to_array() }
+        for r in last {
+            let r = r.corners::<E>();
+            boxes[0] = boxes[0].min(r);
+            centres[0] = centres[0].min(centre(r));
+        }
+        Self { boxes: boxes[0].min(boxes[1]).to_array(), centres: centres[0].min(centres[1]).to_array() }
     }
 
     fn and(&self, other: &Self) -> Self {
@@ -154,7 +164,7 @@ impl Top<'_> {
     fn subtree(&self, refs: &mut [Ref], extent: &Extent, depth: usize) -> Pieces {
         let rules = self.rules;
         if refs.len() <= CHUNK {
-            let nodes = widest(Subtree { refs, rules, depth });
+            let nodes = widest(Subtree { refs, extent, rules, depth });
             return Pieces { count: nodes.len(), list: vec![nodes] };
         }
         let mut node = extent.node(refs.len());
@@ -189,6 +199,7 @@ struct Pending {
 /// What is small enough for one thread, from top to bottom.
 struct Subtree<'a> {
     refs: &'a mut [Ref],
+    extent: &'a Extent,
     rules: &'a Rules,
     depth: usize,
 }
@@ -197,9 +208,9 @@ impl Wide for Subtree<'_> {
     type Output = Vec<Node>;
     #[inline(always)]
     fn run<E: TwoFours>(self) -> Vec<Node> {
-        let Self { refs: all, rules, depth } = self;
+        let Self { refs: all, extent: everything, rules, depth } = self;
         let mut nodes: Vec<Node> = Vec::with_capacity(all.len() * 2 / 3 + 16);
-        let (mut bins, mut costs) = (Bins::new(), [[0.0; 8]; MAX_BINS]);
+        let (mut bins, mut others, mut costs) = (Bins::new(), Bins::new(), [[0.0; 8]; MAX_BINS]);
         let mut pending = vec![Pending { first: 0, end: all.len(), depth, parent: None }];
         while let Some(Pending { first, end, depth, parent }) = pending.pop() {
             let at = nodes.len();
@@ -207,7 +218,7 @@ impl Wide for Subtree<'_> {
                 nodes[parent].right = (at - parent) as u32;
             }
             let refs = &mut all[first..end];
-            let extent = Extent::of::<E>(refs);
+            let extent = if at == 0 { *everything } else { Extent::of::<E>(refs) };
             nodes.push(extent.node(refs.len()));
             let users = if refs.len() <= LEAF { refs.iter().filter(|r| r.is_user()).count() } else { 0 };
             if refs.len() == 1 || (refs.len() <= LEAF && users == 0 && extent.half_area() < rules.large) {
@@ -216,7 +227,11 @@ impl Wide for Subtree<'_> {
             let plane = match rules.split {
                 Split::Sah if depth < MAX_SAH_DEPTH => {
                     let binning = Binning::new(refs.len(), &extent);
-                    bins.fill::<E>(refs, &binning);
+                    if refs.len() < MANY {
+                        bins.fill::<E>(refs, &binning);
+                    } else {
+                        bins.fill_by_two::<E>(&mut others, refs, &binning);
+                    }
                     let plane = bins.cheapest::<E>(&binning, &extent, &mut costs);
                     bins.clear(binning.n);
                     plane
@@ -338,6 +353,22 @@ impl Bins {
         }
     }
 
+    /// As [`Bins::fill`]. Neighbours fall into the same bins, and each would wait for the one before it: two go at once, one of them into `others`,
+    /// which are empty again afterwards.
+    #[inline(always)]
+    fn fill_by_two<E: TwoFours>(&mut self, others: &mut Self, refs: &[Ref], binning: &Binning) {
+        let (first, second) = refs.split_at(refs.len() / 2);
+        for (i, (a, b)) in first.iter().zip(second).enumerate() {
+            ask_ahead(first, i);
+            ask_ahead(second, i);
+            self.put(a.corners::<E>(), binning);
+            others.put(b.corners::<E>(), binning);
+        }
+        self.fill::<E>(&second[first.len()..], binning);
+        self.add::<E>(others, binning.n);
+        others.clear(binning.n);
+    }
+
     #[inline(always)]
     fn put<E: TwoFours>(&mut self, corners: E, binning: &Binning) {
         let (origin, scale) = (Native::load(&binning.origin), Native::load(&binning.scale));
@@ -354,14 +385,17 @@ impl Bins {
     }
 
     /// Adds what others have in the first `n` bins.
-    fn add(&mut self, others: &Self, n: usize) {
+    #[inline(always)]
+    fn add<E: TwoFours>(&mut self, others: &Self, n: usize) {
         for axis in 0..3 {
             for (mine, other) in self.boxes[axis].iter_mut().zip(&others.boxes[axis]).take(n) {
-                mine.iter_mut().zip(other).for_each(|(a, b)| *a = if *a < *b { *a } else { *b });
+                *mine = E::load(mine).min(E::load(other)).to_array();
             }
         }
         for (mine, other) in self.counts.iter_mut().zip(&others.counts).take(n) {
-            mine.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+            for axis in 0..3 {
+                mine[axis] += other[axis];
+            }
         }
     }
 
@@ -415,7 +449,7 @@ impl Bins {
     }
 }
 
-/// Asks for what comes a page's half after reference `i`. Processors do not do so enough by themselves where memory is far away.
+/// Asks for what comes 2 KB after reference `i`: what processors fetch ahead by themselves is not enough where memory is far away.
 #[inline(always)]
 fn ask_ahead(refs: &[Ref], i: usize) {
     if let Some(later) = refs.get(i + 64) {
@@ -431,27 +465,24 @@ impl Wide for Fill<'_> {
     fn run<E: TwoFours>(self) -> Box<Bins> {
         let Self(refs, binning) = self;
         let (mut bins, mut others) = (Bins::new(), Bins::new());
-        // Neighbours fall into the same bins, and each would wait for the one before it: two go at once, into bins of their own.
-        let (first, second) = refs.split_at(refs.len() / 2);
-        for (i, (a, b)) in first.iter().zip(second).enumerate() {
-            ask_ahead(first, i);
-            ask_ahead(second, i);
-            bins.put(a.corners::<E>(), binning);
-            others.put(b.corners::<E>(), binning);
-        }
-        bins.fill::<E>(&second[first.len()..], binning);
-        bins.add(&others, binning.n);
+        bins.fill_by_two::<E>(&mut others, refs, binning);
         bins
     }
 }
 
-struct Cheapest<'a>(&'a Bins, &'a Binning, &'a Extent);
+/// The plane to split a range at, given the bins of its chunks.
+struct Cheapest<'a>(&'a [Box<Bins>], &'a Binning, &'a Extent);
 
 impl Wide for Cheapest<'_> {
     type Output = Option<Plane>;
     #[inline(always)]
     fn run<E: TwoFours>(self) -> Option<Plane> {
-        self.0.cheapest::<E>(self.1, self.2, &mut [[0.0; 8]; MAX_BINS])
+        let Self(chunks, binning, extent) = self;
+        let mut bins = Bins::new();
+        for chunk in chunks {
+            bins.add::<E>(chunk, binning.n);
+        }
+        bins.cheapest::<E>(binning, extent, &mut [[0.0; 8]; MAX_BINS])
     }
 }
 
@@ -472,9 +503,7 @@ impl Wide for Partition<'_> {
 fn split_by_all(refs: &mut [Ref], extent: &Extent) -> Option<(usize, [Extent; 2])> {
     let binning = Binning::new(refs.len(), extent);
     let chunks: Vec<Box<Bins>> = refs.par_chunks(CHUNK).map(|chunk| widest(Fill(chunk, &binning))).collect();
-    let mut bins = Bins::new();
-    chunks.iter().for_each(|chunk| bins.add(chunk, binning.n));
-    let plane = widest(Cheapest(&bins, &binning, extent))?;
+    let plane = widest(Cheapest(&chunks, &binning, extent))?;
     let parts: Vec<_> = refs.par_chunks_mut(CHUNK).map(|chunk| widest(Partition(chunk, plane))).collect();
     let extents = parts.iter().fold([Extent::EMPTY; 2], |[a, b], (_, [left, right])| [a.and(left), b.and(right)]);
     let middle: usize = parts.iter().map(|(count, _)| count).sum();

@@ -201,6 +201,7 @@ impl Layout {
         let mut pending = vec![(0usize, 0usize, 0usize)];
         let mut n_users = 0;
         let mut slots: Vec<(usize, usize)> = Vec::with_capacity(WIDTH);
+        let mut order: Vec<(u32, f64, usize, usize)> = Vec::with_capacity(WIDTH);
         while let Some((wide, n, first)) = pending.pop() {
             slots.clear();
             if plan.tree[n].right == 0 {
@@ -213,16 +214,16 @@ impl Layout {
             // Any-hit traversal takes the last slot first. A few triangles in a box fill it and are soon tested; many are leaves of a tree, or hair (see
             // `traverse::walk`). Of about as many, the smaller box.
             let few = |n: usize| plan.tree[n].count.max(1).ilog2() / 2;
-            slots.sort_by(|&(a, _), &(b, _)| {
-                few(b).cmp(&few(a)).then_with(|| plan.half_area(b).total_cmp(&plan.half_area(a)))
-            });
-            let mut inner = Vec::with_capacity(WIDTH);
-            for (i, &(child, first)) in slots.iter().enumerate() {
+            order.clear();
+            order.extend(slots.iter().map(|&(n, first)| (few(n), plan.half_area(n), n, first)));
+            order.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| b.1.total_cmp(&a.1)));
+            let mark = pending.len();
+            for (i, &(_, _, child, first)) in order.iter().enumerate() {
                 let count = plan.tree[child].count as usize;
                 let is_leaf = plan.tree[child].right == 0 || choices[child][0] == 0;
                 let reference = if !is_leaf {
                     self.nodes.push(WideNode { n: 0, slots: [(0, Child(0)); WIDTH] });
-                    inner.push((self.nodes.len() - 1, child, first));
+                    pending.push((self.nodes.len() - 1, child, first));
                     Child::node(self.nodes.len() - 1)
                 } else if plan.refs[first].is_user() {
                     self.users.push(Run { first, count });
@@ -235,7 +236,7 @@ impl Layout {
                 self.nodes[wide].slots[i] = (child as u32, reference);
             }
             self.nodes[wide].n = slots.len() as u8;
-            pending.extend(inner.into_iter().rev());
+            pending[mark..].reverse();
         }
     }
 }
