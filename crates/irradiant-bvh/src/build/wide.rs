@@ -11,7 +11,8 @@ use crate::level::{Kernel, Level};
 pub(super) trait Wide {
     /// What it gives.
     type Output;
-    /// Does it. To be `#[inline(always)]`, with all that it calls, as [`Kernel::run`].
+    /// Does it. To be `#[inline(always)]`, with all that it calls, as [`Kernel::run`]; lanes in closures that go through functions of the library
+    /// (`for_each`, `map`) are compiled for the baseline and made the whole build three times slower.
     fn run<E: TwoFours>(self) -> Self::Output;
 }
 
