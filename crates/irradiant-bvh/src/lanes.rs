@@ -63,6 +63,26 @@ pub(crate) trait Four: Lanes<Array = [f32; 4]> {
     }
 }
 
+/// Eight lanes as two times the four to build with.
+pub(crate) trait TwoFours: Eight {
+    /// The lower four lanes.
+    fn low(self) -> Native;
+    /// The lower and the upper four lanes.
+    fn of_halves(low: Native, high: Native) -> Self;
+    /// The lower four lanes of both, and the upper four of both.
+    fn halves(a: Self, b: Self) -> [Self; 2];
+    /// Each half as [`Four::transpose`].
+    fn transpose(lanes: [Self; 3]) -> [Self; 3];
+    /// Lanes from 0 to 2^31, rounded down; what others become differs from machine to machine.
+    fn truncate(self) -> Self;
+    /// The halves exchanged.
+    #[inline(always)]
+    fn swapped(self) -> Self {
+        let [low, high] = Self::halves(self, self);
+        Self::of_halves(high.low(), low.low())
+    }
+}
+
 /// Where there is something better it is the specification of it.
 #[cfg_attr(target_arch = "aarch64", allow(dead_code))]
 #[derive(Clone, Copy, Debug)]
@@ -270,6 +290,31 @@ impl<F: Four> Eight for Twice<F> {
     }
 }
 
+impl TwoFours for Twice<Native> {
+    #[inline(always)]
+    fn low(self) -> Native {
+        self.0
+    }
+    #[inline(always)]
+    fn of_halves(low: Native, high: Native) -> Self {
+        Self(low, high)
+    }
+    #[inline(always)]
+    fn halves(a: Self, b: Self) -> [Self; 2] {
+        [Self(a.0, b.0), Self(a.1, b.1)]
+    }
+    #[inline(always)]
+    fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+        let ([d, e, f], [g, h, i]) = (Native::transpose([a.0, b.0, c.0]), Native::transpose([a.1, b.1, c.1]));
+        [Self(d, g), Self(e, h), Self(f, i)]
+    }
+    #[inline(always)]
+    fn truncate(self) -> Self {
+        let whole = |half: Native| Native::from_integers(half.round_down());
+        Self(whole(self.0), whole(self.1))
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx::{Avx, Avx512};
 #[cfg(target_arch = "x86_64")]
@@ -452,7 +497,7 @@ mod sse {
 
     #[derive(Clone, Copy, Debug)]
     #[repr(transparent)]
-    pub(crate) struct Sse(__m128);
+    pub(crate) struct Sse(pub(super) __m128);
 
     macro_rules! operator {
         ($trait:ident, $method:ident, $intrinsic:ident) => {
@@ -562,7 +607,7 @@ mod avx {
     macro_rules! avx {
         ($e:expr) => {
             // SAFETY: only code compiled for AVX2 and FMA (AVX-512) behind a check that the machine has it uses `Avx`
-            // (`Avx512`): the entry points of `traverse`. The only pointers are to whole `[f32; 8]`s (`[f32; 16]`s), read
+            // (`Avx512`): the entry points of `traverse`, and `build::wide`. The only pointers are to whole `[f32; 8]`s (`[f32; 16]`s), read
             // or written unaligned. Guards: `avx_lanes_agree_with_portable_ones`, `avx512_lanes_agree_with_portable_ones`.
             unsafe { $e }
         };
@@ -742,6 +787,38 @@ mod avx {
             out
         }
     }
+
+    impl TwoFours for Avx {
+        #[inline(always)]
+        fn low(self) -> Native {
+            Sse(avx!(_mm256_castps256_ps128(self.0)))
+        }
+        #[inline(always)]
+        fn of_halves(low: Native, high: Native) -> Self {
+            Self(avx!(_mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low.0), high.0)))
+        }
+        #[inline(always)]
+        fn halves(a: Self, b: Self) -> [Self; 2] {
+            [Self(avx!(_mm256_permute2f128_ps::<0x20>(a.0, b.0))), Self(avx!(_mm256_permute2f128_ps::<0x31>(a.0, b.0)))]
+        }
+        #[inline(always)]
+        fn transpose([a, b, c]: [Self; 3]) -> [Self; 3] {
+            let (low, high) = (avx!(_mm256_unpacklo_ps(a.0, b.0)), avx!(_mm256_unpackhi_ps(a.0, b.0)));
+            [
+                Self(avx!(_mm256_shuffle_ps::<0b00_00_01_00>(low, c.0))),
+                Self(avx!(_mm256_shuffle_ps::<0b00_01_11_10>(low, c.0))),
+                Self(avx!(_mm256_shuffle_ps::<0b00_10_01_00>(high, c.0))),
+            ]
+        }
+        #[inline(always)]
+        fn truncate(self) -> Self {
+            Self(avx!(_mm256_cvtepi32_ps(_mm256_cvttps_epi32(self.0))))
+        }
+        #[inline(always)]
+        fn swapped(self) -> Self {
+            Self(avx!(_mm256_permute2f128_ps::<1>(self.0, self.0)))
+        }
+    }
 }
 
 #[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
@@ -801,13 +878,13 @@ mod tests {
         fn compiled(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
             let lanes = [Avx::load(&x), Avx::load(&y), Avx::splat(1.0)];
             let chosen = Avx::choose(lanes, WORDS).as_flattened().iter().map(|l| l.to_array()).collect::<Vec<_>>();
-            [run::<Avx>(x, y), chosen].concat()
+            [run::<Avx>(x, y), chosen, by_halves::<Avx>(x, y)].concat()
         }
         fn portable(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
-            type P = Twice<Portable>;
+            type P = Twice<Native>;
             let lanes = [P::load(&x), P::load(&y), P::splat(1.0)];
             let chosen = P::choose(lanes, WORDS).as_flattened().iter().map(|l| l.to_array()).collect::<Vec<_>>();
-            [run::<P>(x, y), chosen].concat()
+            [run::<P>(x, y), chosen, by_halves::<P>(x, y)].concat()
         }
         if !is_x86_feature_detected!("avx2") || !is_x86_feature_detected!("fma") {
             return;
@@ -840,6 +917,23 @@ mod tests {
                 same(&run::<Pair<Twice<Portable>>>(x, y), &unsafe { compiled(x, y) });
             }
         }
+    }
+
+    /// Fourth lanes of a transpose are noise and left out.
+    #[inline(always)]
+    fn by_halves<E: TwoFours>(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
+        let (a, b) = (E::load(&x), E::load(&y));
+        let whole = E::load(&[0.0, 0.99, 1.0, 1.5, 63.999, 1e-40, 7.0, 2_147_483_520.0]).truncate();
+        let [p, q, r] = E::transpose([a, b, E::splat(3.0)]).map(|l| {
+            let l = l.to_array();
+            [l[0], l[1], l[2], 0.0, l[4], l[5], l[6], 0.0]
+        });
+        let [low, high] = E::halves(a, b).map(|l| l.to_array());
+        [a.swapped(), E::of_halves(a.low(), b.low()), whole]
+            .map(|l| l.to_array())
+            .into_iter()
+            .chain([low, high, p, q, r])
+            .collect()
     }
 
     #[inline(always)]

@@ -27,6 +27,9 @@ const CANDIDATE: f32 = 0.02;
 const CACHED: usize = 1 << 19;
 const FOLLOWING: f32 = 0.25;
 
+/// Leaves whose blocks are filled before they are put together: a few megabytes.
+const WAVE: usize = 1 << 14;
+
 struct Plan<'a> {
     tree: &'a [binary::Node],
     refs: &'a [Ref],
@@ -50,18 +53,10 @@ pub(crate) fn collapse(
     tree: &[binary::Node],
     refs: Vec<Ref>,
     input: &BuildInput,
+    starts: &[u32],
     settings: &BuildSettings,
     mut report: BuildReport,
 ) -> Bvh {
-    let starts: Vec<u32> = input
-        .meshes
-        .iter()
-        .scan(0u32, |sum, m| {
-            let first = *sum;
-            *sum += m.triangles.len() as u32;
-            Some(first)
-        })
-        .collect();
     let root = &tree[0];
     let extent = (0..3).map(|a| f64::from(root.hi[a]) - f64::from(root.lo[a])).fold(0.0, f64::max);
     let plan = Plan {
@@ -69,7 +64,7 @@ pub(crate) fn collapse(
         refs: &refs,
         settings,
         scale: if extent > 0.0 { 1.0 / extent } else { 0.0 },
-        per_block: pack::triangles_per_block(&refs, input, &starts),
+        per_block: pack::triangles_per_block(&refs, input, starts),
         block_cost: settings.block_cost * if refs.len() > CACHED { FOLLOWING } else { 1.0 },
     };
     let mut choices = vec![[0u8; 8]; tree.len()];
@@ -81,14 +76,18 @@ pub(crate) fn collapse(
     layout.lay_out(&plan, &choices);
     drop(choices);
 
-    let packed: Vec<Packed> =
-        layout.leaves.par_chunks(1024).map(|runs| pack::pack(runs, &refs, input, &starts)).collect();
-    let mut blocks = vec_on_large_pages(packed.iter().map(|p| p.blocks.len()).sum());
+    // Room for somewhat more than is expected: memory that is never touched costs nothing.
+    let mut blocks = vec_on_large_pages((1.25 * report.triangles as f32 / plan.per_block) as usize);
     let mut first_blocks: Vec<u32> = Vec::with_capacity(layout.leaves.len());
-    for part in packed {
-        let first_block = blocks.len() as u32;
-        blocks.extend(part.blocks);
-        first_blocks.extend(part.first_blocks.iter().map(|b| b + first_block));
+    // Not all at once: what the threads fill is copied while it is in the cache, and its memory used again.
+    for wave in layout.leaves.chunks(WAVE) {
+        let packed: Vec<Packed> =
+            wave.par_chunks(WAVE / 32).map(|runs| pack::pack(runs, &refs, input, starts)).collect();
+        for part in packed {
+            let first_block = blocks.len() as u32;
+            blocks.extend_from_slice(&part.blocks);
+            first_blocks.extend(part.first_blocks.iter().map(|b| b + first_block));
+        }
     }
     let mut nodes: Vec<Node> = vec_on_large_pages(layout.nodes.len());
     layout
@@ -202,6 +201,7 @@ impl Layout {
         let mut pending = vec![(0usize, 0usize, 0usize)];
         let mut n_users = 0;
         let mut slots: Vec<(usize, usize)> = Vec::with_capacity(WIDTH);
+        let mut order: Vec<(u32, f64, usize, usize)> = Vec::with_capacity(WIDTH);
         while let Some((wide, n, first)) = pending.pop() {
             slots.clear();
             if plan.tree[n].right == 0 {
@@ -214,16 +214,16 @@ impl Layout {
             // Any-hit traversal takes the last slot first. A few triangles in a box fill it and are soon tested; many are leaves of a tree, or hair (see
             // `traverse::walk`). Of about as many, the smaller box.
             let few = |n: usize| plan.tree[n].count.max(1).ilog2() / 2;
-            slots.sort_by(|&(a, _), &(b, _)| {
-                few(b).cmp(&few(a)).then_with(|| plan.half_area(b).total_cmp(&plan.half_area(a)))
-            });
-            let mut inner = Vec::with_capacity(WIDTH);
-            for (i, &(child, first)) in slots.iter().enumerate() {
+            order.clear();
+            order.extend(slots.iter().map(|&(n, first)| (few(n), plan.half_area(n), n, first)));
+            order.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| b.1.total_cmp(&a.1)));
+            let mark = pending.len();
+            for (i, &(_, _, child, first)) in order.iter().enumerate() {
                 let count = plan.tree[child].count as usize;
                 let is_leaf = plan.tree[child].right == 0 || choices[child][0] == 0;
                 let reference = if !is_leaf {
                     self.nodes.push(WideNode { n: 0, slots: [(0, Child(0)); WIDTH] });
-                    inner.push((self.nodes.len() - 1, child, first));
+                    pending.push((self.nodes.len() - 1, child, first));
                     Child::node(self.nodes.len() - 1)
                 } else if plan.refs[first].is_user() {
                     self.users.push(Run { first, count });
@@ -236,7 +236,7 @@ impl Layout {
                 self.nodes[wide].slots[i] = (child as u32, reference);
             }
             self.nodes[wide].n = slots.len() as u8;
-            pending.extend(inner.into_iter().rev());
+            pending[mark..].reverse();
         }
     }
 }

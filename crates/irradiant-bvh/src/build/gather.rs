@@ -1,19 +1,32 @@
 //! Boxes of primitives, with what cannot be met left out.
 
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use super::{BuildInput, BuildReport, Mesh};
-use crate::lanes::{Lanes, Native};
+use crate::lanes::TwoFours;
+use crate::pages::vec_on_large_pages;
 
 /// Coordinates beyond this are as good as infinite: boxes are clamped to it for building, so that extents stay finite.
 pub(crate) const FAR: f32 = 1e38;
 
-/// A primitive as the builder sees it: 32 bytes.
+/// A primitive as the builder sees it: 32 bytes, the lower corner of its box and the upper one mirrored at the origin, so that both are the least of what
+/// they bound; after the lower corner its id, after the upper one what is wrong with it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(crate) struct Ref {
-    lo: [f32; 4],
-    hi: [f32; 4],
+pub(crate) struct Ref([f32; 8]);
+
+/// Why a primitive is left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Flaw {
+    NonFinite,
+    ZeroArea,
+    BadIndex,
+    BadBox,
+}
+
+impl Flaw {
+    const ALL: [Self; 4] = [Self::NonFinite, Self::ZeroArea, Self::BadIndex, Self::BadBox];
 }
 
 impl Ref {
@@ -26,102 +39,121 @@ impl Ref {
     fn new(lo: [f32; 3], hi: [f32; 3], id: u32) -> Self {
         let clamp = |a: f32| a.clamp(-FAR, FAR);
         let ([a, b, c], [d, e, f]) = (lo.map(clamp), hi.map(clamp));
-        Self { lo: [a, b, c, f32::from_bits(id | Self::NORMAL)], hi: [d, e, f, 0.0] }
+        Self([a, b, c, f32::from_bits(id | Self::NORMAL), -d, -e, -f, 0.0])
     }
 
-    /// Lower corner; the fourth lane is noise.
-    #[inline(always)]
-    pub fn lo(&self) -> Native {
-        Native::load(&self.lo)
+    /// In the place of what is left out.
+    fn flawed(flaw: Flaw) -> Self {
+        Self([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0 + flaw as u32 as f32])
     }
-    /// Upper corner; the fourth lane is noise.
+    fn flaw(&self) -> Option<Flaw> {
+        Flaw::ALL.into_iter().find(|&flaw| self.0[7] == 1.0 + flaw as u32 as f32)
+    }
+
+    /// Lower corner, noise, mirrored upper corner, noise.
     #[inline(always)]
-    pub fn hi(&self) -> Native {
-        Native::load(&self.hi)
+    pub fn corners<E: TwoFours>(&self) -> E {
+        E::load(&self.0)
     }
     /// Twice the centre along `axis`.
     #[inline(always)]
     pub fn centre(&self, axis: usize) -> f32 {
-        self.lo[axis] + self.hi[axis]
+        self.0[axis] - self.0[axis + 4]
     }
     /// Index in its list.
     #[inline(always)]
     pub fn id(&self) -> u32 {
-        self.lo[3].to_bits() & (Self::NORMAL - 1)
+        self.0[3].to_bits() & (Self::NORMAL - 1)
     }
     #[inline(always)]
     pub fn is_user(&self) -> bool {
-        self.lo[3].to_bits() & Self::USER != 0
+        self.0[3].to_bits() & Self::USER != 0
     }
 }
 
 /// References to all usable primitives: triangles in order, then users in order.
-pub(crate) fn gather(input: &BuildInput) -> (Vec<Ref>, BuildReport) {
+pub(crate) fn gather(input: &BuildInput, starts: &[u32]) -> (Vec<Ref>, BuildReport) {
+    let triangles: usize = input.meshes.iter().map(|m| m.triangles.len()).sum();
+    let total = triangles + input.user_boxes.len();
+    let mut refs = vec_on_large_pages(total);
+    let any_flaw = AtomicBool::new(false);
+    let one = |meshes: &mut Meshes, i: usize| {
+        let found = match i.checked_sub(triangles) {
+            Some(user) => of_box(&input.user_boxes[user], user as u32),
+            None => of_triangle(meshes, i as u32),
+        };
+        found.unwrap_or_else(|flaw| {
+            any_flaw.store(true, Relaxed);
+            Ref::flawed(flaw)
+        })
+    };
+    (0..total)
+        .into_par_iter()
+        .with_min_len(1 << 12)
+        .map_init(|| Meshes::new(input, starts), one)
+        .collect_into_vec(&mut refs);
     let mut report = BuildReport::default();
-    let total: usize = input.meshes.iter().map(|m| m.triangles.len()).sum();
-    let mut refs = Vec::with_capacity(total + input.user_boxes.len());
-    let mut first = 0u32;
-    for mesh in input.meshes {
-        const CHUNK: usize = 1 << 16;
-        if mesh.triangles.len() <= CHUNK {
-            gather_triangles(mesh, first, 0..mesh.triangles.len(), &mut refs, &mut report);
-        } else {
-            // Chunks are joined in order; how they were shared out does not show.
-            let chunks: Vec<_> = (0..mesh.triangles.len().div_ceil(CHUNK))
-                .into_par_iter()
-                .map(|c| {
-                    let range = c * CHUNK..((c + 1) * CHUNK).min(mesh.triangles.len());
-                    let (mut refs, mut report) = (Vec::with_capacity(range.len()), BuildReport::default());
-                    gather_triangles(mesh, first, range, &mut refs, &mut report);
-                    (refs, report)
-                })
-                .collect();
-            for (part, counts) in chunks {
-                refs.extend_from_slice(&part);
-                report.non_finite_triangles += counts.non_finite_triangles;
-                report.zero_area_triangles += counts.zero_area_triangles;
-                report.bad_index_triangles += counts.bad_index_triangles;
+    if any_flaw.into_inner() {
+        refs.retain(|r| match r.flaw() {
+            None => true,
+            Some(flaw) => {
+                *match flaw {
+                    Flaw::NonFinite => &mut report.non_finite_triangles,
+                    Flaw::ZeroArea => &mut report.zero_area_triangles,
+                    Flaw::BadIndex => &mut report.bad_index_triangles,
+                    Flaw::BadBox => &mut report.bad_boxes,
+                } += 1;
+                false
             }
-        }
-        first += mesh.triangles.len() as u32;
+        });
     }
-    report.triangles = refs.len();
-    for (id, [lo, hi]) in (0u32..).zip(input.user_boxes) {
-        // Written so that a NaN fails.
-        if (0..3).all(|a| lo[a] <= hi[a]) {
-            refs.push(Ref::new(*lo, *hi, id | Ref::USER));
-        } else {
-            report.bad_boxes += 1;
-        }
-    }
-    report.users = refs.len() - report.triangles;
+    report.users = input.user_boxes.len() - report.bad_boxes;
+    report.triangles = refs.len() - report.users;
     (refs, report)
 }
 
-fn gather_triangles(
-    mesh: &Mesh,
-    first: u32,
-    range: std::ops::Range<usize>,
-    refs: &mut Vec<Ref>,
-    report: &mut BuildReport,
-) {
-    for i in range {
-        let Some([a, b, c]) = vertices(mesh, i) else {
-            report.bad_index_triangles += 1;
-            continue;
-        };
-        if !(a.iter().chain(&b).chain(&c).all(|x| x.is_finite())) {
-            report.non_finite_triangles += 1;
-            continue;
-        }
-        if has_no_area(&a, &b, &c) {
-            report.zero_area_triangles += 1;
-        } else {
-            let lo = std::array::from_fn(|k| a[k].min(b[k]).min(c[k]));
-            let hi = std::array::from_fn(|k| a[k].max(b[k]).max(c[k]));
-            refs.push(Ref::new(lo, hi, first + i as u32));
-        }
+/// Finds the meshes that triangles are in.
+pub(super) struct Meshes<'a> {
+    meshes: &'a [Mesh<'a>],
+    /// The index of each mesh's first triangle among all.
+    starts: &'a [u32],
+    /// Where the last one was found: neighbours are mostly of the same mesh.
+    last: usize,
+}
+
+impl<'a> Meshes<'a> {
+    pub fn new(input: &'a BuildInput, starts: &'a [u32]) -> Self {
+        Self { meshes: input.meshes, starts, last: 0 }
     }
+
+    /// The mesh of a triangle, and its index there.
+    #[inline(always)]
+    pub fn find(&mut self, id: u32) -> (&'a Mesh<'a>, usize) {
+        let starts = self.starts;
+        if id < starts[self.last] || starts.get(self.last + 1).is_some_and(|&next| next <= id) {
+            self.last = starts.partition_point(|&start| start <= id) - 1;
+        }
+        (&self.meshes[self.last], (id - starts[self.last]) as usize)
+    }
+}
+
+fn of_box([lo, hi]: &[[f32; 3]; 2], id: u32) -> Result<Ref, Flaw> {
+    // Written so that a NaN fails.
+    if (0..3).all(|a| lo[a] <= hi[a]) { Ok(Ref::new(*lo, *hi, id | Ref::USER)) } else { Err(Flaw::BadBox) }
+}
+
+fn of_triangle(meshes: &mut Meshes, id: u32) -> Result<Ref, Flaw> {
+    let (mesh, i) = meshes.find(id);
+    let [a, b, c] = vertices(mesh, i).ok_or(Flaw::BadIndex)?;
+    if !(a.iter().chain(&b).chain(&c).all(|x| x.is_finite())) {
+        return Err(Flaw::NonFinite);
+    }
+    if has_no_area(&a, &b, &c) {
+        return Err(Flaw::ZeroArea);
+    }
+    let lo = std::array::from_fn(|k| a[k].min(b[k]).min(c[k]));
+    let hi = std::array::from_fn(|k| a[k].max(b[k]).max(c[k]));
+    Ok(Ref::new(lo, hi, id))
 }
 
 /// The corners of triangle `i` of `mesh`; `None` if an index is out of range.

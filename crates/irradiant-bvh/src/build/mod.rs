@@ -8,6 +8,7 @@ mod binary;
 mod collapse;
 mod gather;
 mod pack;
+mod wide;
 
 use crate::node::{Bvh, MAX_PRIMITIVES, STACK};
 
@@ -84,17 +85,22 @@ impl Bvh {
     pub fn build(input: &BuildInput, settings: &BuildSettings) -> Self {
         let count = input.meshes.iter().map(|m| m.triangles.len()).sum::<usize>().max(input.user_boxes.len());
         assert!(count < MAX_PRIMITIVES, "{count} primitives are too many for one tree");
-        let (refs, report) = gather::gather(input);
+        let starts = starts(input);
+        let (refs, report) = gather::gather(input, &starts);
         // Only adversarial input makes the first tree deeper than the traversal stack; halving at every split bounds it.
-        Self::build_over(refs, input, settings, report, binary::Split::Sah)
+        Self::build_over(refs, input, &starts, settings, report, binary::Split::Sah)
             .filter(|bvh| bvh.stack_need() <= STACK)
-            .or_else(|| Self::build_over(gather::gather(input).0, input, settings, report, binary::Split::Halve))
+            .or_else(|| {
+                let (refs, _) = gather::gather(input, &starts);
+                Self::build_over(refs, input, &starts, settings, report, binary::Split::Halve)
+            })
             .unwrap_or_else(|| Self { nodes: vec![], blocks: vec![], users: vec![], bounds: None, report })
     }
 
     fn build_over(
         mut refs: Vec<gather::Ref>,
         input: &BuildInput,
+        starts: &[u32],
         settings: &BuildSettings,
         report: BuildReport,
         split: binary::Split,
@@ -103,8 +109,14 @@ impl Bvh {
             return None;
         }
         let tree = binary::build(&mut refs, split);
-        Some(collapse::collapse(&tree, refs, input, settings, report))
+        Some(collapse::collapse(&tree, refs, input, starts, settings, report))
     }
+}
+
+/// The index of each mesh's first triangle among all.
+fn starts(input: &BuildInput) -> Vec<u32> {
+    let first = |sum: &mut u32, mesh: &Mesh| Some(std::mem::replace(sum, *sum + mesh.triangles.len() as u32));
+    input.meshes.iter().scan(0, first).collect()
 }
 
 #[cfg(test)]
@@ -208,10 +220,11 @@ mod tests {
             .collect();
         let bvh = build(&[], &[], &boxes);
         assert_eq!(bvh.validate(), Ok(()));
-        let (refs, report) = gather::gather(&BuildInput { meshes: &[], user_boxes: &boxes });
+        let (refs, report) = gather::gather(&BuildInput { meshes: &[], user_boxes: &boxes }, &[]);
         let halved = Bvh::build_over(
             refs,
             &BuildInput { meshes: &[], user_boxes: &boxes },
+            &[],
             &BuildSettings::default(),
             report,
             binary::Split::Halve,

@@ -4,9 +4,10 @@
 //! patch of five triangles has at most seven vertices; triangles without neighbours go in pairs.
 
 use super::collapse::Run;
-use super::gather::{self, Ref};
+use super::gather::{self, Meshes, Ref};
 use super::{BuildInput, Mesh};
 use crate::node::{BLOCK, Block, VERTICES};
+use crate::prefetch::prefetch_read;
 
 /// Blocks of some leaves, counted from the first of them.
 pub(super) struct Packed {
@@ -61,25 +62,36 @@ impl Filling {
     }
 }
 
-/// The mesh of a triangle, and its corners.
-fn corners<'a>(reference: &Ref, input: &'a BuildInput, starts: &[u32]) -> (&'a Mesh<'a>, [[f32; 3]; 3]) {
-    let id = reference.id();
-    let m = if starts.len() == 1 { 0 } else { starts.partition_point(|&s| s <= id) - 1 };
-    let mesh = &input.meshes[m];
-    // Gathered triangles have sound indices.
-    (mesh, gather::vertices(mesh, (id - starts[m]) as usize).unwrap_or_default())
+/// The corners of a triangle; gathered ones have sound indices.
+fn corners(mesh: &Mesh, i: usize) -> [[f32; 3]; 3] {
+    gather::vertices(mesh, i).unwrap_or_default()
 }
+
+/// Triangles of a leaf lie anywhere in their mesh: they are asked for this many leaves before they are needed, and the references to them as long before
+/// that.
+const AHEAD: usize = 4;
 
 /// Fills blocks with the triangles of leaves, each leaf's in order.
 pub(super) fn pack(leaves: &[Run], refs: &[Ref], input: &BuildInput, starts: &[u32]) -> Packed {
     let n: usize = leaves.iter().map(|l| l.count).sum();
     let mut out =
-        Packed { blocks: Vec::with_capacity(leaves.len() + n / 16), first_blocks: Vec::with_capacity(leaves.len()) };
-    for leaf in leaves {
+        Packed { blocks: Vec::with_capacity(leaves.len() + n / 8), first_blocks: Vec::with_capacity(leaves.len()) };
+    let (mut meshes, mut meshes_ahead) = (Meshes::new(input, starts), Meshes::new(input, starts));
+    for (i, leaf) in leaves.iter().enumerate() {
+        if let Some(later) = leaves.get(i + 2 * AHEAD) {
+            refs[later.first..later.first + later.count].iter().step_by(2).for_each(prefetch_read);
+        }
+        if let Some(next) = leaves.get(i + AHEAD) {
+            for reference in &refs[next.first..next.first + next.count] {
+                let (mesh, i) = meshes_ahead.find(reference.id());
+                prefetch_read(&mesh.triangles[i]);
+            }
+        }
         out.first_blocks.push(out.blocks.len() as u32);
         let mut filling = Filling::default();
         for reference in &refs[leaf.first..leaf.first + leaf.count] {
-            let (mesh, corners) = corners(reference, input, starts);
+            let (mesh, i) = meshes.find(reference.id());
+            let corners = corners(mesh, i);
             let id = reference.id() | if mesh.filtered { Block::FILTERED } else { 0 };
             if !filling.add(&corners, id) {
                 out.blocks.push(std::mem::take(&mut filling).finish(false));
@@ -95,11 +107,13 @@ pub(super) fn pack(leaves: &[Run], refs: &[Ref], input: &BuildInput, starts: &[u
 pub(super) fn triangles_per_block(refs: &[Ref], input: &BuildInput, starts: &[u32]) -> f32 {
     const RUNS: usize = 256;
     let (mut blocks, mut triangles) = (0usize, 0usize);
+    let mut meshes = Meshes::new(input, starts);
     for run in 0..RUNS {
         let first = refs.len() * run / RUNS;
         let mut filling = Filling::default();
         for reference in refs[first..].iter().take(BLOCK).filter(|r| !r.is_user()) {
-            if !filling.add(&corners(reference, input, starts).1, 0) {
+            let (mesh, i) = meshes.find(reference.id());
+            if !filling.add(&corners(mesh, i), 0) {
                 break;
             }
         }
