@@ -41,6 +41,7 @@ const MANY: usize = 16;
 
 impl Instances<'_> {
     /// The same for up to [`MANY`] rays.
+    #[inline(always)]
     fn all_inside(&self, user: u32, rays: &[Ray]) -> (&Bvh, Part, [Ray; MANY]) {
         let mut local = [Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; MANY];
         for (local, ray) in local.iter_mut().zip(rays) {

@@ -21,6 +21,8 @@ pub(crate) trait Lanes:
     const ALL: u32;
     fn load(a: &Self::Array) -> Self;
     fn splat(a: f32) -> Self;
+    /// Rows of four numbers, one for each lane, turned: the first numbers of all, the second, the third, the fourth.
+    fn columns(rows: &[&[f32; 4]]) -> [Self; 4];
     fn to_array(self) -> Self::Array;
     fn min(self, b: Self) -> Self;
     fn max(self, b: Self) -> Self;
@@ -151,6 +153,10 @@ impl Lanes for Portable {
         Self([a; 4])
     }
     #[inline(always)]
+    fn columns(rows: &[&[f32; 4]]) -> [Self; 4] {
+        std::array::from_fn(|k| Self([rows[0][k], rows[1][k], rows[2][k], rows[3][k]]))
+    }
+    #[inline(always)]
     fn to_array(self) -> [f32; 4] {
         self.0
     }
@@ -225,6 +231,12 @@ macro_rules! doubled {
             #[inline(always)]
             fn splat(a: f32) -> Self {
                 Self(F::splat(a), F::splat(a))
+            }
+            #[inline(always)]
+            fn columns(rows: &[&[f32; 4]]) -> [Self; 4] {
+                let [a, b, c, d] = F::columns(&rows[..$half]);
+                let [e, f, g, h] = F::columns(&rows[$half..]);
+                [Self(a, e), Self(b, f), Self(c, g), Self(d, h)]
             }
             #[inline(always)]
             fn to_array(self) -> [f32; $whole] {
@@ -402,6 +414,17 @@ mod neon {
             Self(baseline!(vdupq_n_f32(a)))
         }
         #[inline(always)]
+        fn columns(rows: &[&[f32; 4]]) -> [Self; 4] {
+            let (a, b) = (Self::load(rows[0]).0, Self::load(rows[1]).0);
+            let (c, d) = (Self::load(rows[2]).0, Self::load(rows[3]).0);
+            // First and third numbers of two rows, second and fourth; then of all.
+            let (ab, ab_odd) = (baseline!(vtrn1q_f32(a, b)), baseline!(vtrn2q_f32(a, b)));
+            let (cd, cd_odd) = (baseline!(vtrn1q_f32(c, d)), baseline!(vtrn2q_f32(c, d)));
+            let low = |ab, cd| Self(baseline!(vcombine_f32(vget_low_f32(ab), vget_low_f32(cd))));
+            let high = |ab, cd| Self(baseline!(vcombine_f32(vget_high_f32(ab), vget_high_f32(cd))));
+            [low(ab, cd), low(ab_odd, cd_odd), high(ab, cd), high(ab_odd, cd_odd)]
+        }
+        #[inline(always)]
         fn to_array(self) -> [f32; 4] {
             let mut a = [0.0; 4];
             baseline!(vst1q_f32(a.as_mut_ptr(), self.0));
@@ -551,6 +574,20 @@ mod sse {
             Self(baseline!(_mm_set1_ps(a)))
         }
         #[inline(always)]
+        fn columns(rows: &[&[f32; 4]]) -> [Self; 4] {
+            let (a, b) = (Self::load(rows[0]).0, Self::load(rows[1]).0);
+            let (c, d) = (Self::load(rows[2]).0, Self::load(rows[3]).0);
+            // First and second numbers of two rows, third and fourth; then of all.
+            let (ab, ab_high) = (baseline!(_mm_unpacklo_ps(a, b)), baseline!(_mm_unpackhi_ps(a, b)));
+            let (cd, cd_high) = (baseline!(_mm_unpacklo_ps(c, d)), baseline!(_mm_unpackhi_ps(c, d)));
+            [
+                Self(baseline!(_mm_movelh_ps(ab, cd))),
+                Self(baseline!(_mm_movehl_ps(cd, ab))),
+                Self(baseline!(_mm_movelh_ps(ab_high, cd_high))),
+                Self(baseline!(_mm_movehl_ps(cd_high, ab_high))),
+            ]
+        }
+        #[inline(always)]
         fn to_array(self) -> [f32; 4] {
             let mut a = [0.0; 4];
             baseline!(_mm_storeu_ps(a.as_mut_ptr(), self.0));
@@ -607,8 +644,8 @@ mod avx {
     macro_rules! avx {
         ($e:expr) => {
             // SAFETY: only code compiled for AVX2 and FMA (AVX-512) behind a check that the machine has it uses `Avx`
-            // (`Avx512`): the entry points of `traverse`, and `build::wide`. The only pointers are to whole `[f32; 8]`s (`[f32; 16]`s), read
-            // or written unaligned. Guards: `avx_lanes_agree_with_portable_ones`, `avx512_lanes_agree_with_portable_ones`.
+            // (`Avx512`): the entry points of `traverse`, and `build::wide`. The only pointers are to whole `[f32; 8]`s (`[f32; 16]`s,
+            // `[f32; 4]`s), read or written unaligned. Guards: `avx_lanes_agree_with_portable_ones`, `avx512_lanes_agree_with_portable_ones`.
             unsafe { $e }
         };
     }
@@ -658,6 +695,27 @@ mod avx {
         #[inline(always)]
         fn splat(a: f32) -> Self {
             Self(avx!(_mm512_set1_ps(a)))
+        }
+        #[inline(always)]
+        fn columns(rows: &[&[f32; 4]]) -> [Self; 4] {
+            // Rows `i`, `4 + i`, `8 + i` and `12 + i`, so that four by four numbers are turned in each quarter.
+            macro_rules! quarters {
+                ($i:literal) => {{
+                    let first = avx!(_mm512_castps128_ps512(_mm_loadu_ps(rows[$i].as_ptr())));
+                    let two = avx!(_mm512_insertf32x4::<1>(first, _mm_loadu_ps(rows[4 + $i].as_ptr())));
+                    let three = avx!(_mm512_insertf32x4::<2>(two, _mm_loadu_ps(rows[8 + $i].as_ptr())));
+                    avx!(_mm512_insertf32x4::<3>(three, _mm_loadu_ps(rows[12 + $i].as_ptr())))
+                }};
+            }
+            let (a, b, c, d) = (quarters!(0), quarters!(1), quarters!(2), quarters!(3));
+            let (ab, ab_high) = (avx!(_mm512_unpacklo_ps(a, b)), avx!(_mm512_unpackhi_ps(a, b)));
+            let (cd, cd_high) = (avx!(_mm512_unpacklo_ps(c, d)), avx!(_mm512_unpackhi_ps(c, d)));
+            [
+                Self(avx!(_mm512_shuffle_ps::<0b01_00_01_00>(ab, cd))),
+                Self(avx!(_mm512_shuffle_ps::<0b11_10_11_10>(ab, cd))),
+                Self(avx!(_mm512_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high))),
+                Self(avx!(_mm512_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high))),
+            ]
         }
         #[inline(always)]
         fn to_array(self) -> [f32; 16] {
@@ -718,6 +776,25 @@ mod avx {
         #[inline(always)]
         fn splat(a: f32) -> Self {
             Self(avx!(_mm256_set1_ps(a)))
+        }
+        #[inline(always)]
+        fn columns(rows: &[&[f32; 4]]) -> [Self; 4] {
+            // Rows `i` and `4 + i`, so that four by four numbers are turned in each half.
+            macro_rules! halves {
+                ($i:literal) => {{
+                    let first = avx!(_mm256_castps128_ps256(_mm_loadu_ps(rows[$i].as_ptr())));
+                    avx!(_mm256_insertf128_ps::<1>(first, _mm_loadu_ps(rows[4 + $i].as_ptr())))
+                }};
+            }
+            let (a, b, c, d) = (halves!(0), halves!(1), halves!(2), halves!(3));
+            let (ab, ab_high) = (avx!(_mm256_unpacklo_ps(a, b)), avx!(_mm256_unpackhi_ps(a, b)));
+            let (cd, cd_high) = (avx!(_mm256_unpacklo_ps(c, d)), avx!(_mm256_unpackhi_ps(c, d)));
+            [
+                Self(avx!(_mm256_shuffle_ps::<0b01_00_01_00>(ab, cd))),
+                Self(avx!(_mm256_shuffle_ps::<0b11_10_11_10>(ab, cd))),
+                Self(avx!(_mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high))),
+                Self(avx!(_mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high))),
+            ]
         }
         #[inline(always)]
         fn to_array(self) -> [f32; 8] {
@@ -942,7 +1019,13 @@ mod tests {
         let mut rows = x;
         (0..F::ALL.count_ones()).for_each(|i| rows[i as usize] = f32::from_bits((i % 3) << 3));
         let table = [1.0, 2.0, 3.0].map(|row: f32| std::array::from_fn(|column| 10.0 * row + column as f32));
+        let four: Vec<_> = (0..F::ALL.count_ones() as usize).map(|i| [y[i], x[i], -x[i], i as f32]).collect();
+        let [c0, c1, c2, c3] = F::columns(&four.iter().collect::<Vec<_>>());
         let results = [
+            c0,
+            c1,
+            c2,
+            c3,
             a + b,
             a - b,
             a * b,

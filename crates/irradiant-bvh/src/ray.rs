@@ -26,6 +26,16 @@ impl Ray {
         let ([ox, oy, oz], [dx, dy, dz]) = (self.o, self.d);
         (F::load(&[ox, oy, oz, self.t_max]), F::load(&[dx, dy, dz, self.time]))
     }
+
+    /// Origin with end, and direction with time, where they are: what is read number by number the compiler gathers, which is slow.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub(crate) fn rows(&self) -> (&[f32; 4], &[f32; 4]) {
+        const { assert!(size_of::<Self>() == 32) };
+        // SAFETY: a ray is eight floats one after the other, as written above. Guard: `rays_are_rows_of_numbers`.
+        let [first, last] = unsafe { &*std::ptr::from_ref(self).cast::<[[f32; 4]; 2]>() };
+        (first, last)
+    }
 }
 
 /// Where a ray meets a triangle.
@@ -140,4 +150,11 @@ impl Leaves for TrianglesOnly {
     fn occluded(&self, _user: u32, _ray: &Ray) -> bool {
         false
     }
+}
+
+#[cfg(test)]
+#[test]
+fn rays_are_rows_of_numbers() {
+    let ray = Ray { o: [1.0, 2.0, 3.0], t_max: 4.0, d: [5.0, 6.0, 7.0], time: 8.0 };
+    assert_eq!(ray.rows(), (&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0, 7.0, 8.0]));
 }

@@ -64,20 +64,14 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
     /// With their ends, minus infinity for lanes without a ray.
     #[inline(always)]
     fn new(rays: &[Ray], which: &[u16], octant: usize) -> (Self, Column) {
-        let mut columns = [Column([0.0; PACKET]); 7];
+        let (mut origins, mut directions) = ([&[0.0; 4]; PACKET], [&[0.0; 4]; PACKET]);
         let last = which[which.len() - 1];
         for i in 0..PACKET {
-            let ray = &rays[*which.get(i).unwrap_or(&last) as usize];
-            for k in 0..3 {
-                columns[k].0[i] = ray.o[k];
-                columns[3 + k].0[i] = ray.d[k];
-            }
-            columns[6].0[i] = ray.t_max;
+            (origins[i], directions[i]) = rays[*which.get(i).unwrap_or(&last) as usize].rows();
         }
-        let [ox, oy, oz, dx, dy, dz, mut t] = columns;
-        t.0[which.len()..].fill(f32::NEG_INFINITY);
-        let load = |column: Column| E::load(&column.0);
-        let (o, d) = ([load(ox), load(oy), load(oz)], [load(dx), load(dy), load(dz)]);
+        let ([ox, oy, oz, ends], [dx, dy, dz, _]) = (E::columns(&origins), E::columns(&directions));
+        let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
+        let ends = E::select((1 << which.len()) - 1, ends, E::splat(f32::NEG_INFINITY));
         let (one, zero, minus) = (E::splat(1.0), E::splat(0.0), E::splat(-1.0));
         let (padding, lost) = (E::splat(WIDER), E::splat(FUSED_LOST));
         let inverse = [one / d[0], one / d[1], one / d[2]];
@@ -103,7 +97,7 @@ impl<E: Lanes<Array = [f32; PACKET]>> Crowd<E> {
             sheared_origin,
             shear: [(sx * minus) / sz, (sy * minus) / sz, one / sz],
         };
-        (crowd, t)
+        (crowd, Column(ends.to_array()))
     }
 
     /// Where the rays enter a child, and which of them do before `far`.

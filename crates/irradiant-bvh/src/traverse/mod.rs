@@ -189,10 +189,16 @@ impl<U: Copy> Best<U> {
         self.offer_user_hit(leaves, index, leaves.intersect(index, &self.ray_for_user(ray)));
     }
 
-    /// The ray to ask about user primitives: equal distances count.
+    /// The ray to ask about user primitives.
     #[inline(always)]
     fn ray_for_user(&self, ray: &Ray) -> Ray {
-        Ray { t_max: if self.found { self.t.next_up() } else { self.t }, ..*ray }
+        Ray { t_max: Self::end_for_user(self.t, self.found), ..*ray }
+    }
+
+    /// Where it ends: hits as far away as one that was found count.
+    #[inline(always)]
+    fn end_for_user(t: f32, found: bool) -> f32 {
+        if found { t.next_up() } else { t }
     }
 
     /// What user primitive `index` said.

@@ -140,13 +140,16 @@ impl<U: Copy> Bests<U> {
     ) {
         for index in leaf.index().. {
             let user = bvh.users[index];
-            let (rays, which, n) = gathered(active, |i| self.get(i).ray_for_user(&ray(i)));
+            let end = |i: usize| Best::<U>::end_for_user(self.t.0[i], self.found >> i & 1 != 0);
+            let (rays, which, n) = gathered(active, |i| Ray { t_max: end(i), ..ray(i) });
             let mut hits = [None; PACKET];
             leaves.intersect_many(user & !LAST_USER, &rays[..n], &mut hits[..n]);
             for (&i, hit) in which[..n].iter().zip(hits) {
-                let mut one = self.get(i);
-                one.offer_user_hit(leaves, user & !LAST_USER, hit);
-                self.set(i, one);
+                if hit.is_some() {
+                    let mut one = self.get(i);
+                    one.offer_user_hit(leaves, user & !LAST_USER, hit);
+                    self.set(i, one);
+                }
             }
             if user & LAST_USER != 0 {
                 break;

@@ -342,6 +342,7 @@ fn is_within(t: f64, t_max: f32) -> bool {
     t > 0.0 && (t as f32) > 0.0 && (t as f32) < t_max
 }
 
+#[inline(always)]
 fn rays_to_group(instance: &Instance, rays: &[bvh::Ray]) -> [bvh::Ray; MANY] {
     let mut local = [bvh::Ray { o: [0.0; 3], t_max: 0.0, d: [0.0; 3], time: 0.0 }; MANY];
     for (local, ray) in local.iter_mut().zip(rays) {
