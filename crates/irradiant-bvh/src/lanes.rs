@@ -997,6 +997,7 @@ mod tests {
     }
 
     /// Fourth lanes of a transpose are noise and left out.
+    #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn by_halves<E: TwoFours>(x: [f32; 8], y: [f32; 8]) -> Vec<[f32; 8]> {
         let (a, b) = (E::load(&x), E::load(&y));
