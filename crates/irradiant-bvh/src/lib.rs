@@ -40,7 +40,7 @@ mod validate;
 pub use build::{BuildInput, BuildReport, BuildSettings, Mesh};
 pub use level::{Kernel, Level};
 pub use node::Bvh;
-pub use pages::vec_on_large_pages;
+pub use pages::{move_to_large_pages, vec_on_large_pages};
 pub use part::{Braid, Part, braid};
 pub use prefetch::{prefetch_read, prefetch_whole};
 pub use ray::{Closest, Hit, Leaves, Ray, TrianglesOnly};

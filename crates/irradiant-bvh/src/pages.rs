@@ -10,15 +10,30 @@ const WORTH: usize = 4 << 20;
 /// depends on it.
 pub fn vec_on_large_pages<T>(n: usize) -> Vec<T> {
     let vec = Vec::<T>::with_capacity(n);
-    advise(vec.as_ptr().cast(), n * size_of::<T>());
+    advise(vec.as_ptr().cast(), n * size_of::<T>(), Advice::LargePages);
     vec
+}
+
+/// Moves what an array holds onto large pages, if it is large and the system grants them (Linux 6.1). What the allocator has used before is on small ones,
+/// whatever [`vec_on_large_pages`] asked for: a tree there took 1.04 of the time in a street of 250,000 triangles. Only speed depends on it.
+pub fn move_to_large_pages<T>(array: &[T]) {
+    advise(array.as_ptr().cast(), size_of_val(array), Advice::Collapse);
+}
+
+/// Numbers of Linux's `madvise`.
+#[cfg_attr(not(target_os = "linux"), allow(dead_code))]
+#[derive(Clone, Copy)]
+enum Advice {
+    /// `MADV_HUGEPAGE`: large pages for what is touched from now on.
+    LargePages = 14,
+    /// `MADV_COLLAPSE`: large pages for what is there.
+    Collapse = 25,
 }
 
 #[cfg(target_os = "linux")]
 #[allow(unsafe_code)]
-fn advise(start: *const u8, bytes: usize) {
+fn advise(start: *const u8, bytes: usize, advice: Advice) {
     const PAGE: usize = 2 << 20;
-    const MADV_HUGEPAGE: i32 = 14;
     unsafe extern "C" {
         fn madvise(start: *mut core::ffi::c_void, bytes: usize, advice: i32) -> i32;
     }
@@ -28,16 +43,16 @@ fn advise(start: *const u8, bytes: usize) {
     let skip = start.align_offset(PAGE);
     let whole = bytes.saturating_sub(skip) / PAGE * PAGE;
     if whole > 0 {
-        // SAFETY: the range is whole pages inside one allocation; this advice changes neither contents nor access, and
+        // SAFETY: the range is whole pages inside one allocation; neither advice changes contents or access, and
         // a refusal is no harm. Guard: `large_arrays_hold_what_is_put_in`.
         unsafe {
-            madvise(start.wrapping_add(skip).cast_mut().cast(), whole, MADV_HUGEPAGE);
+            madvise(start.wrapping_add(skip).cast_mut().cast(), whole, advice as i32);
         }
     }
 }
 
 #[cfg(not(target_os = "linux"))]
-fn advise(_start: *const u8, _bytes: usize) {
+fn advise(_start: *const u8, _bytes: usize, _advice: Advice) {
     let _ = WORTH;
 }
 
@@ -54,7 +69,8 @@ mod tests {
             assert_eq!(numbers.iter().sum::<u64>(), (n as u64 * (n as u64).saturating_sub(1)) / 2);
             // Growing past what was asked for moves the memory.
             numbers.extend(0..n as u64);
-            assert_eq!(numbers.len(), 2 * n);
+            move_to_large_pages(&numbers);
+            assert!(numbers.iter().copied().eq((0..n as u64).chain(0..n as u64)));
         }
     }
 }

@@ -10,7 +10,7 @@ use super::gather::{FAR, Ref};
 use super::pack::{self, Packed};
 use super::{BuildInput, BuildReport, BuildSettings};
 use crate::node::{Bvh, Child, LAST_USER, Node, WIDTH};
-use crate::pages::vec_on_large_pages;
+use crate::pages::{move_to_large_pages, vec_on_large_pages};
 
 /// The choice for `n` slots at index `n - 1`: how many go to the left child; 0 means a leaf (for one slot), or
 /// "as with one slot fewer". With one slot, the number counts out of the eight of the new node.
@@ -96,6 +96,8 @@ pub(crate) fn collapse(
         .with_min_len(512)
         .map(|wide| wide_node(tree, wide, &first_blocks))
         .collect_into_vec(&mut nodes);
+    move_to_large_pages(&blocks);
+    move_to_large_pages(&nodes);
     let mut users = Vec::with_capacity(report.users);
     for leaf in &layout.users {
         let mut ids: Vec<u32> = refs[leaf.first..leaf.first + leaf.count].iter().map(Ref::id).collect();

@@ -227,6 +227,10 @@ impl FlatTriangle {
         if flat == 0 || all > Self::MOST || all - flat > flat.max(Self::EMPTY) {
             return Vec::new();
         }
-        meshes().flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |i| Self::of(shapes, mesh, i))).collect()
+        let all: Vec<_> = meshes()
+            .flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |i| Self::of(shapes, mesh, i)))
+            .collect();
+        irradiant_bvh::move_to_large_pages(&all);
+        all
     }
 }

@@ -118,9 +118,11 @@ impl Pixels {
                 [r, g, b]
             }));
             if !exact {
+                irradiant_bvh::move_to_large_pages(&pixels);
                 return Self::Single(pixels);
             }
         }
+        irradiant_bvh::move_to_large_pages(&all);
         Self::Half(all.into_boxed_slice())
     }
 

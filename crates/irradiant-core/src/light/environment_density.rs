@@ -145,6 +145,7 @@ impl PixelDensity {
         let rows: Vec<f32> = row_sums.iter().map(|r| if largest > 0.0 { (r / largest) as f32 } else { 0.0 }).collect();
         density.rows = PiecewiseConstant1D::new(rows)?;
         density.normalisation = if total > 0.0 { (count / total) as f32 } else { 0.0 };
+        irradiant_bvh::move_to_large_pages(&density.fine);
         Some(density)
     }
 
