@@ -19,9 +19,9 @@ pub struct Size {
     pub tracer: String,
     /// Triangles of the mesh and its floor.
     pub triangles: usize,
-    /// CPU seconds of the build, one thread.
+    /// CPU seconds of the build, one thread; 0 if it was left out.
     pub build_seconds: f64,
-    /// Of them those of other threads than the one that asked; none: measured before they were told apart, and "one thread" may have been two.
+    /// Of them those of other threads than the one that asked; none: left out, or measured before they were told apart, when "one thread" may have been two.
     #[serde(default)]
     pub helped_seconds: Option<f64>,
     /// Nanoseconds per primary ray, one at a time.
@@ -85,28 +85,29 @@ fn sizes(largest: usize, embrees: &rays::Embrees, missing: &mut Vec<String>) -> 
         let [primary, bounce, ..] = sets::rays(&subject, &tree, 512);
         let builds = builds::by_turns(&format!("displaced-{n}"), 1, &embrees.builders, BUILDS);
         let mut builds = embrees.builders.iter().zip(builds);
-        let mut say = |trace: &dyn Fn(&[Ray], &mut [f32])| {
+        let mut say = |trace: &dyn Fn(&[Ray], &mut [f32]), memory_bytes: usize| {
             let Some(((tracer, _), build)) = builds.next() else { return };
-            let builds::Once { spent, memory_bytes } = match build {
-                Ok(once) => once,
+            // A build that was not on one thread is left out; rays are asked all the same.
+            let (build_seconds, helped_seconds) = match build {
+                Ok(builds::Once { spent, .. }) => (spent.cpu_seconds, Some(spent.helped_seconds)),
                 Err(why) => {
-                    println!("  left out: {why}");
+                    println!("  build left out: {why}");
                     missing.push(why);
-                    return;
+                    (0.0, None)
                 }
             };
             let (primary, bounce) = (per_ray(&primary.rays, trace), per_ray(&bounce.rays, trace));
-            let (triangles, build_seconds) = (geometry.triangles(), spent.cpu_seconds);
+            let triangles = geometry.triangles();
             println!(
                 "{triangles:9} triangles {tracer:12} build {build_seconds:7.3} CPU s, primary {primary:6.1} ns, bounce {bounce:6.1} ns"
             );
-            let (tracer, helped_seconds) = (tracer.clone(), Some(spent.helped_seconds));
+            let tracer = tracer.clone();
             found.push(Size { tracer, triangles, build_seconds, helped_seconds, primary, bounce, memory_bytes });
         };
-        say(&|r, o| tree.closest(r, o));
+        say(&|r, o| tree.closest(r, o), tree.memory_bytes());
         for e in &embrees.libraries {
             let tree = e.build(geometry, false, 1)?;
-            say(&|r, o| tree.closest(r, o));
+            say(&|r, o| tree.closest(r, o), tree.memory_bytes());
         }
     }
     Ok(found)

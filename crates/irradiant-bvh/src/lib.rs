@@ -18,7 +18,7 @@
 //! - `traverse`: the walk, once for closest hits and once for any hit, for one ray, for packets of sixteen that travel together, and for crowds of
 //!   sixteen that go anywhere.
 //! - `part`: walks that begin below the top, and which parts of instances to put in a tree over them.
-//! - `lanes`: four floats, or eight; `prefetch`: asking for memory early; `pages`: large arrays.
+//! - `lanes`: four, eight or sixteen floats; `prefetch`: asking for memory early; `pages`: large arrays.
 //!
 //! What it does not know: materials, transforms, normals, motion. Sources: Ylitie, Karras, Laine 2017 (wide collapse);
 //! Wald 2007 (binned SAH); Woop, Benthin, Wald 2013 (watertight triangles); Ize 2013 (conservative boxes);

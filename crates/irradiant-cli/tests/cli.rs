@@ -331,16 +331,17 @@ fn refused_samples_are_told_with_commands_that_replay_them() {
         assert!(stderr(&output).contains("samples were not finite or out of range"), "{}", stderr(&output));
         stderr(&output)
     };
-    for words in [
-        &[][..],
-        &["--integrator", "path", "--estimator", "roulette=constant", "--max-depth", "3"],
-        &["--preview"],
-        &["--sampler", "halton"],
+    for (words, expected) in [
+        (&[][..], ""),
+        (&["--integrator", "path", "--estimator", "roulette=constant", "--max-depth", "3"], "roulette=constant"),
+        (&["--preview"], "--sampler zsobol"),
+        (&["--sampler", "halton"], "--sampler halton"),
     ] {
         let said = render(words);
         let commands: Vec<&str> = said.lines().filter_map(|l| l.trim().strip_prefix("irradiant ")).collect();
         assert!(!commands.is_empty(), "{said}");
         for command in commands {
+            assert!(command.contains(expected), "{command}");
             let output = folder.run(&command.split(' ').collect::<Vec<_>>());
             assert_eq!(code(&output), 0, "{command}: {}", stderr(&output));
         }
@@ -591,6 +592,11 @@ fn a_preview_has_blue_noise_whatever_the_scene_says() {
     assert_ne!(independent, blue);
     assert_eq!(picture(&["b.pbrt", "--preview", "--sampler", "independent"]), independent);
     assert_ne!(picture(&["a.pbrt"]), picture(&["b.pbrt"]));
+    // The flag means what the scene's directive means.
+    for name in ["zsobol", "paddedsobol", "independent", "halton", "sobol", "pmj02bn"] {
+        folder.write("c.pbrt", &format!("Sampler \"{name}\"\n{SCENE}"));
+        assert_eq!(picture(&["b.pbrt", "--sampler", name]), picture(&["c.pbrt"]), "{name}");
+    }
 }
 
 #[test]

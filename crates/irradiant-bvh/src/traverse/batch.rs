@@ -157,7 +157,8 @@ const MODERATE: usize = 1024;
 /// Crowds of fewer rays are not worth it.
 const LEAST: usize = 4;
 
-/// Tries packets, of rays whose directions do not differ by more than a `spread`, then halves of such. Others go alone, or in crowds of one octant.
+/// Tries packets, of rays whose directions do not differ by more than a `spread`. Others go in crowds of one octant, where those suit the tree; else halves of
+/// packets are tried, and the rest goes alone.
 #[inline(always)]
 fn in_company<T>(
     crowds: bool,

@@ -107,9 +107,9 @@ impl<T: Copy> Stack<T> {
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn get(&self, i: usize) -> T {
-        // SAFETY: `closest` and `any` ask only below their count of entries, all of which they have set; no tree
+        // SAFETY: walks, packets and crowds ask only below their count of entries, all of which they have set; no tree
         // needs more than `STACK` (`Bvh::build`), so masking never aliases two of them, and every bit pattern of `T`
-        // (integers, `Child`) is a value. Guards: `all_levels_agree_with_brute_force`,
+        // (numbers, `Child`, and structs of these) is a value. Guards: `all_levels_agree_with_brute_force`,
         // `trees_too_deep_for_the_stack_are_built_again_in_halves`.
         unsafe { self.entries[i & MASK].assume_init() }
     }
