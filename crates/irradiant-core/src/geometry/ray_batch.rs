@@ -171,7 +171,10 @@ mod tests {
         let odd = [0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3e38, -1e-45];
         for n in [0, 1, 7, ENOUGH, LANES] {
             let ray = |i: usize| {
-                let d = std::array::from_fn(|axis| if i % 3 == 0 { odd[(i / 3 + axis) % odd.len()] } else { number() });
+                let d =
+                    std::array::from_fn(
+                        |axis| if i.is_multiple_of(3) { odd[(i / 3 + axis) % odd.len()] } else { number() },
+                    );
                 bvh::Ray { o: [0.0; 3], t_max: 1.0, d, time: 0.0 }
             };
             let rays: Vec<_> = (0..n).map(ray).collect();
