@@ -10,7 +10,7 @@
 
 use crate::camera_samples::{CameraSample, SampleBatch, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, Renderer, WorkUnit};
-use crate::light_samples::{MOST_SPLITS, check_splits, direct_light, samples_of};
+use crate::light_samples::{LightChoice, MOST_SPLITS, check_splits, direct_light, samples_of};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
 use crate::staged_path::Batch;
@@ -35,8 +35,10 @@ pub struct PathIntegrator {
     pub regularize: bool,
     /// When paths end by chance.
     pub roulette: Roulette,
-    /// Strata of the choice of a light at the first surface, 1 to 64.
+    /// Strata of the choice of a light at the first surface, 1 to 64: each light that is picked is tested.
     pub light_splits: u32,
+    /// The same at the first two surfaces, where nothing else is said, but one of those lights is tested.
+    pub light_candidates: u32,
 }
 
 /// When paths end by chance; the expected picture is the same.
@@ -61,7 +63,7 @@ words! {
 
 impl Default for PathIntegrator {
     fn default() -> Self {
-        Self { max_depth: None, regularize: false, roulette: Roulette::default(), light_splits: 1 }
+        Self { max_depth: None, regularize: false, roulette: Roulette::default(), light_splits: 1, light_candidates: CANDIDATES }
     }
 }
 
@@ -116,7 +118,8 @@ impl Integrator for PathIntegrator {
     }
 
     fn check(&self, _: &Scene) -> Result<(), String> {
-        check_splits(self.light_splits)
+        check_splits("light_splits", self.light_splits)?;
+        check_splits("light_candidates", self.light_candidates)
     }
 
     fn limits(&self) -> Vec<Limit> {
@@ -136,6 +139,20 @@ pub(crate) const fn lights_option(default: u32) -> OptionEntry {
         doc: "light samples at the first surface: one of each light, or of so many lights that are picked (A59)",
     }
 }
+
+/// Of how many lights the best, by chance, is tested at the first two surfaces.
+const CANDIDATES: u32 = 4;
+
+/// So many surfaces choose among candidates; what later ones bring is not worth it (decision 8).
+const CHOOSING: u32 = 2;
+
+/// Of how many lights one is tested.
+pub(crate) const CANDIDATES_OPTION: OptionEntry = OptionEntry {
+    name: "candidates",
+    range: OptionRange::Count(1, MOST_SPLITS),
+    default: Value::Count(CANDIDATES),
+    doc: "light samples at the first two surfaces of which one is tested by a ray, chosen at random by what each would bring if nothing stood in the way (A59); the first surface has those of `lights`, if that is more than 1",
+};
 
 /// By name.
 pub const ENTRY: crate::registry::IntegratorEntry = {
@@ -164,6 +181,7 @@ pub const ENTRY: crate::registry::IntegratorEntry = {
                 doc: "chance to end a path at each event, with roulette=constant; of finite variance only where albedo^2 < 1 - q (B25)",
             },
             lights_option(1),
+            CANDIDATES_OPTION,
             LIGHT_SAMPLER,
         ],
         make: |options, max_depth| Box::new(PathIntegrator::of(options, max_depth)),
@@ -250,7 +268,7 @@ impl PathIntegrator {
             Ends::Throughput => Roulette::Throughput,
             Ends::Constant => Roulette::Constant(options.number("q")),
         };
-        Self { max_depth, regularize: options.flag("regularize"), roulette, light_splits: options.count("lights") }
+        Self { max_depth, regularize: options.flag("regularize"), roulette, light_splits: options.count("lights"), light_candidates: options.count("candidates") }
     }
 
     /// Whether a path ends at a surface after so many scattering events.
@@ -264,10 +282,16 @@ impl PathIntegrator {
         depth > SPARED || matches!(self.roulette, Roulette::Constant(_))
     }
 
-    /// Strata of the choice of a light at the surface after so many scattering events.
+    /// How lights are sampled at the surface after so many scattering events.
     #[inline]
-    pub(crate) fn light_splits_at(&self, depth: u32) -> u32 {
-        if depth == 0 { self.light_splits } else { 1 }
+    pub(crate) fn light_choice_at(&self, depth: u32) -> LightChoice {
+        if depth == 0 && self.light_splits > 1 {
+            LightChoice { splits: self.light_splits, is_resampled: false }
+        } else if depth < CHOOSING {
+            LightChoice { splits: self.light_candidates, is_resampled: true }
+        } else {
+            LightChoice::ONE
+        }
     }
 
     /// What the camera ray sees, by one random path. Fills the layers of the film at the first surface.
@@ -385,7 +409,7 @@ impl PathIntegrator {
                     lambda,
                     &draws,
                     run,
-                    self.light_splits_at(depth),
+                    self.light_choice_at(depth),
                     None,
                     depth,
                     stats,
@@ -460,7 +484,7 @@ impl PathIntegrator {
         } else {
             sample.pdf
         };
-        let light_splits = self.light_splits_at(walk.depth - 1);
+        let light_splits = self.light_choice_at(walk.depth - 1).splits;
         walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular, light_splits });
         walk.ray = at.spawn_ray(sample.wi);
         walk.escape_place = scene.lights.place_of_escape(sample.wi);

@@ -61,6 +61,11 @@ impl RayBatch {
         self.blocked[ray]
     }
 
+    /// Says so of a ray, by another's knowledge.
+    pub fn set_blocked(&mut self, ray: usize, is_blocked: bool) {
+        self.blocked[ray] = is_blocked;
+    }
+
     /// Holds the first `n` of these, each up to its `t_max`, instead of what there was; [`LANES`] at most.
     #[inline(always)]
     pub fn take(&mut self, n: usize, o: &Triples, d: &Triples, time: &Floats, t_max: impl Fn(usize) -> f32) {

@@ -64,6 +64,17 @@ impl TargetLanes {
         }
     }
 
+    /// If so, takes the ray of a lane that has been aimed.
+    #[inline(always)]
+    pub fn keep(&mut self, i: usize, from: &Self, is_taken: bool) {
+        let choose = |a: f32, b: f32| if is_taken { a } else { b };
+        for (to, from) in [(&mut self.o, &from.o), (&mut self.d, &from.d)] {
+            let (a, b) = (from.vector(i), to.vector(i));
+            to.set(i, [choose(a.x, b.x), choose(a.y, b.y), choose(a.z, b.z)]);
+        }
+        self.is_infinite[i] = if is_taken { from.is_infinite[i] } else { self.is_infinite[i] };
+    }
+
     /// Adds the ray of a lane.
     #[inline(always)]
     pub fn put_ray(&self, i: usize, time: f32, rays: &mut RayBatch) {

@@ -68,10 +68,10 @@ impl StreamLanes {
         self.block(n, 1, [false, false], out);
     }
 
-    /// As [`SampleStream::light`], of `n` lanes: where on the light, perhaps which; nothing to spare.
+    /// As [`SampleStream::light`], of `n` lanes: where on the light, perhaps which, perhaps one to spare.
     #[inline(always)]
-    pub fn light(&self, n: usize, depth: u32, pick: bool, out: &mut BlockLanes) {
-        self.block(n, CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX, [pick, false], out);
+    pub fn light(&self, n: usize, depth: u32, pick: bool, resample: bool, out: &mut BlockLanes) {
+        self.block(n, CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX, [pick, resample], out);
     }
 
     /// As [`SampleStream::scatter`], of `n` lanes: which direction, perhaps which lobe, perhaps roulette.

@@ -255,8 +255,8 @@ impl Bookkeeper<'_> {
             let scattering = recorder.scatterings.get(depth as usize);
             let asks = bsdf.flags().is_non_specular() && integrator.max_depth.is_none_or(|limit| depth < limit);
             if asks {
-                let splits = integrator.light_splits_at(depth);
-                let picked = PickedLights::of(scene, &at.reference(), &self.stream.light(depth), splits);
+                let choice = integrator.light_choice_at(depth);
+                let picked = PickedLights::of(scene, &at.reference(), &self.stream.light(depth), choice.splits);
                 for (light, share) in picked.iter() {
                     let c = found(Technique::LightSample, depth + 1).find(|c| c.light == light.id);
                     let pmf = f64::from(light.pmf) / f64::from(share);

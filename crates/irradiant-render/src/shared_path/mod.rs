@@ -29,7 +29,7 @@ mod staged;
 
 use crate::camera_samples::{CameraSample, camera_sample_by};
 use crate::integrator::{Integrator, Limit, RenderStats, Renderer, WorkUnit};
-use crate::light_samples::{check_splits, direct_light, pick_light, sky_sample};
+use crate::light_samples::{LightChoice, check_splits, direct_light, pick_light, sky_sample};
 use crate::path::{PathIntegrator, Previous, Walk, lights_option, survival_probability};
 use crate::record::{Contribution, NoRecord, PathRecorder};
 use crate::registry::{IntegratorEntry, LIGHT_SAMPLER, OptionEntry, OptionRange, Value};
@@ -179,7 +179,7 @@ impl Integrator for SharedPathIntegrator {
     }
 
     fn check(&self, scene: &Scene) -> Result<(), String> {
-        check_splits(self.light_splits)?;
+        check_splits("light_splits", self.light_splits)?;
         if scene.materials.may_pass() {
             return Err(
                 "sharedpath cannot join surfaces through mixes that hold an interface; --integrator path can".into()
@@ -201,7 +201,8 @@ impl Integrator for SharedPathIntegrator {
 impl SharedPathIntegrator {
     /// By whose rules paths go where nothing is shared.
     fn path(&self) -> PathIntegrator {
-        PathIntegrator { max_depth: self.max_depth, light_splits: self.light_splits, ..PathIntegrator::default() }
+        let (max_depth, light_splits) = (self.max_depth, self.light_splits);
+        PathIntegrator { max_depth, light_splits, light_candidates: 1, ..PathIntegrator::default() }
     }
 
     /// As [`Integrator::render`], one path at a time: the specification of what is done for many at once where the scene allows it, the same
@@ -337,13 +338,13 @@ impl SharedPathIntegrator {
         let sky = looks.sky.filter(|_| gains(&bsdf));
         if bsdf.flags().is_non_specular() {
             let (draws, one) = (stream.light(0), SampledSpectrum::ONE);
-            let splits = path.light_splits_at(0);
+            let choice = path.light_choice_at(0);
             if let Some(sky) = sky {
-                looks.light = Some(sky_sample(scene, &at, &draws, splits, sky));
+                looks.light = Some(sky_sample(scene, &at, &draws, choice.splits, sky));
             }
             let except = sky.map(|sky| sky.id);
             member.radiance +=
-                direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, splits, except, 0, stats, &mut NoRecord);
+                direct_light(scene, &at, &bsdf, &one, lambda, &draws, None, choice, except, 0, stats, &mut NoRecord);
         }
         if gains(&bsdf) {
             let drawn = draw(&bsdf, at.wo, &stream.scatter(0));
@@ -398,7 +399,7 @@ impl SharedPathIntegrator {
         }
         let direct_light = |throughput, lambda: &_, stats: &mut _| {
             let draws = stream.light(1);
-            direct_light(scene, &at, &bsdf, throughput, lambda, &draws, None, 1, None, 1, stats, &mut NoRecord)
+            direct_light(scene, &at, &bsdf, throughput, lambda, &draws, None, LightChoice::ONE, None, 1, stats, &mut NoRecord)
         };
         if !is_shared(&bsdf) {
             if walk.throughput.is_black() {

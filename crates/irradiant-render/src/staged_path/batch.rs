@@ -2,7 +2,9 @@
 
 use super::kernels::{Numbers, PlacesOfBounces, PlacesOfCamera, Scatter};
 use super::lamps::{PlainLamp, has_one_light};
+use super::split::ChosenLanes;
 use crate::camera_samples::{BatchSample, Beginnings};
+use crate::light_samples::{LightChoice, strata};
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
@@ -87,7 +89,7 @@ pub(super) fn nowhere() -> TextureContext {
 pub(super) struct SpectrumLanes(pub [Floats; N_WAVELENGTHS]);
 
 impl SpectrumLanes {
-    const ZERO: Self = Self([[0.0; LANES]; N_WAVELENGTHS]);
+    pub const ZERO: Self = Self([[0.0; LANES]; N_WAVELENGTHS]);
 
     /// Of a path.
     #[inline(always)]
@@ -189,6 +191,8 @@ pub(crate) struct Batch {
     pub(super) brings: [u32; LANES],
     /// Paths whose light samples are drawn alone.
     pub(super) light_alone: Vec<u32>,
+    /// Those of several that were chosen, of which one is tested.
+    pub(super) chosen: ChosenLanes,
     /// Where several lights are sampled: of each path so many places, with the number of strata that picked the light; how many are taken;
     /// and a stratum's numbers.
     pub(super) light_picks: Vec<(PickedLight, u32)>,
@@ -274,6 +278,7 @@ impl Batch {
             brought: SpectrumLanes::ZERO,
             brings: [0; LANES],
             light_alone: Vec::new(),
+            chosen: ChosenLanes::NONE,
             light_picks: Vec::new(),
             light_counts: [0; LANES],
             light_pick: [0.0; LANES],
@@ -446,6 +451,13 @@ impl Batch {
         (light, !f.is_black() & !self.arriving.at(i).is_black() & f.is_finite())
     }
 
+    /// Whether a lane's light sample is to be counted. Not comparisons that NaN fails: what is wrong must reach the film, which counts it. No path
+    /// that has gone has a light.
+    #[inline(always)]
+    pub fn counts(&self, i: usize) -> bool {
+        (self.brings[i] != 0) & (self.pmf[i] != 0.0) & (self.targets.pdf[i] != 0.0)
+    }
+
     /// A lane's metal.
     #[inline(always)]
     pub fn metal(&self, i: usize) -> Conductor {
@@ -525,9 +537,10 @@ impl Batch {
     }
 
     /// Draws the numbers of vertices that are known, those for roulette only where it is played.
-    pub fn draw(&mut self, n: usize, depth: u32, scene: &Scene, roulette: bool) {
+    pub fn draw(&mut self, n: usize, depth: u32, scene: &Scene, choice: LightChoice, roulette: bool) {
         let (pick, lobe) = (!has_one_light(scene), !self.bsdfs.is_empty());
-        scene.geometry.level().run(Numbers { batch: self, n, depth, pick, lobe, roulette });
+        let resample = choice.is_resampled && strata(scene, choice.splits) > 1;
+        scene.geometry.level().run(Numbers { batch: self, n, depth, pick, resample, lobe, roulette });
     }
 
     /// Draws directions, and the rays that go there.

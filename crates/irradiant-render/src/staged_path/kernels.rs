@@ -30,8 +30,9 @@ pub(super) struct Numbers<'a> {
     pub batch: &'a mut Batch,
     pub n: usize,
     pub depth: u32,
-    /// Whether there are several lights.
+    /// Whether there are several lights, and whether one of several candidates is chosen.
     pub pick: bool,
+    pub resample: bool,
     /// Whether there are models of their own, with lobes.
     pub lobe: bool,
     /// Whether paths may end by chance.
@@ -42,8 +43,8 @@ impl Kernel for Numbers<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self { batch: b, n, depth, pick, lobe, roulette } = self;
-        b.streams.light(n, depth, pick, &mut b.light);
+        let Self { batch: b, n, depth, pick, resample, lobe, roulette } = self;
+        b.streams.light(n, depth, pick, resample, &mut b.light);
         b.streams.scatter(n, depth, lobe, roulette, &mut b.scatter);
     }
 }
@@ -149,6 +150,27 @@ impl Kernel for Weigh<'_> {
                 b.brought.set(i, chosen(is_metal, light, b.brought.at(i)));
                 b.brings[i] = if is_metal { u32::from(counts) } else { b.brings[i] };
             }
+        }
+    }
+}
+
+/// Chooses between what a path's light samples have brought so far and the next one.
+pub(super) struct Choose<'a>(pub &'a mut Batch, pub usize);
+
+impl Kernel for Choose<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Self(b, n) = self;
+        for i in whole(n) {
+            let brought = b.brought.at(i);
+            let weight = if b.counts(i) { brought.average() } else { 0.0 };
+            let to = &mut b.chosen;
+            let is_taken = to.takes(i, weight);
+            to.brought.set(i, chosen(is_taken, brought, to.brought.at(i)));
+            to.targets.keep(i, &b.targets, is_taken);
+            to.picked[i] = if is_taken { b.picked[i] } else { to.picked[i] };
+            to.is_delta[i] = if is_taken { b.is_delta[i] } else { to.is_delta[i] };
         }
     }
 }

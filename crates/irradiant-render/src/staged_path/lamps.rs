@@ -4,9 +4,8 @@ use super::batch::{Batch, MetLamp};
 use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
-use crate::light_samples::{all_are_sampled, direct_light, samples_by_chance, strata};
+use crate::light_samples::{LightChoice, all_are_sampled, samples_by_chance, strata};
 use crate::path::power_heuristic;
-use crate::record::NoRecord;
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::geometry::EmitterShape;
 use irradiant_core::interaction::LightId;
@@ -107,38 +106,29 @@ impl Batch {
         }
     }
 
-    /// A light sample of each path, or several where the choice of the light is split into `splits` strata.
+    /// A light sample of each path, or several.
     pub fn light_samples(
         &mut self,
         n: usize,
-        depth: u32,
-        splits: u32,
+        choice: LightChoice,
         scene: &Scene,
         samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        if strata(scene, splits) > 1 {
-            self.split_light_samples(n, depth, splits, scene, samples, radiance, stats);
+        if strata(scene, choice.splits) > 1 {
+            self.split_light_samples(n, choice, scene, samples, radiance, stats);
             return;
         }
         self.pick_lights(n, scene);
-        if self.sample_picked(n, depth, scene, samples, radiance, stats) {
-            self.arriving_light(n, scene, radiance, stats);
+        if self.sample_picked(n, scene, samples) {
+            self.arriving_light(n, scene, samples, radiance, stats);
         }
     }
 
     /// Points of the lights that have been picked, and how they are weighed. Whether there are any.
-    pub(super) fn sample_picked(
-        &mut self,
-        n: usize,
-        depth: u32,
-        scene: &Scene,
-        samples: &[BatchSample],
-        radiance: &mut [SampledSpectrum],
-        stats: &mut RenderStats,
-    ) -> bool {
-        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(depth, scene, samples, radiance, stats);
+    pub(super) fn sample_picked(&mut self, n: usize, scene: &Scene, samples: &[BatchSample]) -> bool {
+        let any = self.sample_lamps(n, scene, samples) | self.sample_alone(scene, samples);
         if any {
             scene.geometry.level().run(Weigh(self, n));
         }
@@ -272,28 +262,13 @@ impl Batch {
     }
 
     /// Light samples that are asked alone. Whether there are any.
-    fn sample_alone(
-        &mut self,
-        depth: u32,
-        scene: &Scene,
-        samples: &[BatchSample],
-        radiance: &mut [SampledSpectrum],
-        stats: &mut RenderStats,
-    ) -> bool {
-        let may_pass = scene.materials.may_pass();
+    fn sample_alone(&mut self, scene: &Scene, samples: &[BatchSample]) -> bool {
         let mut any = false;
         for j in 0..self.light_alone.len() {
             let i = self.light_alone[j] as usize;
-            let s = self.sample[i] as usize;
-            let lambda = &samples[s].lambda;
+            let lambda = &samples[self.sample[i] as usize].lambda;
             let light = scene.lights.get(LightId(self.picked[i]));
-            let sample = if may_pass && light.is_delta() {
-                radiance[s] += self.light_through_mixes(i, depth, scene, &samples[s], stats);
-                None
-            } else {
-                light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE)
-            };
-            let Some(sample) = sample else {
+            let Some(sample) = light.sample(&self.at.reference(i), self.light.uv(i), lambda, MODE) else {
                 self.pmf[i] = 0.0;
                 continue;
             };
@@ -305,40 +280,8 @@ impl Batch {
         any
     }
 
-    /// A light sample of one path.
-    #[cold]
-    fn light_through_mixes(
-        &self,
-        i: usize,
-        depth: u32,
-        scene: &Scene,
-        sample: &BatchSample,
-        stats: &mut RenderStats,
-    ) -> SampledSpectrum {
-        direct_light(
-            scene,
-            &self.interaction(i),
-            &self.bsdf(i),
-            &self.throughput.at(i),
-            &sample.lambda,
-            &sample.stream(scene).light(depth),
-            None,
-            1,
-            None,
-            depth,
-            stats,
-            &mut NoRecord,
-        )
-    }
-
-    /// What light samples bring, unless something is in the way.
-    pub(super) fn arriving_light(
-        &mut self,
-        n: usize,
-        scene: &Scene,
-        radiance: &mut [SampledSpectrum],
-        stats: &mut RenderStats,
-    ) {
+    /// What light samples bring to models of their own.
+    pub(super) fn bring_alone(&mut self) {
         for k in 0..self.bsdfs.len() {
             let i = self.bsdf_lanes[k] as usize;
             let (bsdf, wi) = (&self.bsdfs[k], self.targets.wi.vector(i));
@@ -349,22 +292,93 @@ impl Batch {
                 self.brings[i] = u32::from(counts);
             }
         }
-        // Put down in any case, and kept where it counts: a branch would be guessed wrong often. No path that has gone has a light.
-        let mut asking = 0;
-        for i in 0..n {
-            self.asking[asking] = i as u32;
-            // Not comparisons that NaN fails: what is wrong must reach the film, which counts it.
-            asking += usize::from((self.brings[i] != 0) & (self.pmf[i] != 0.0) & (self.targets.pdf[i] != 0.0));
-        }
-        self.rays.clear();
-        for &i in &self.asking[..asking] {
-            self.targets.put_ray(i as usize, self.time[i as usize], &mut self.rays);
-        }
-        stats.shadow_rays += asking as u64;
-        scene.geometry.occluded_rays(&mut self.rays, &scene.alpha());
+    }
+
+    /// What light samples bring, unless something is in the way.
+    pub(super) fn arriving_light(
+        &mut self,
+        n: usize,
+        scene: &Scene,
+        samples: &[BatchSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) {
+        self.bring_alone();
+        let asking = self.ask(n, Self::counts);
+        self.test_light(asking, Whose::Drawn, scene, samples, stats);
         for (k, &i) in self.asking[..asking].iter().enumerate() {
             let (light, s) = (self.brought.at(i as usize), self.sample[i as usize] as usize);
             radiance[s] += if self.rays.is_blocked(k) { SampledSpectrum::ZERO } else { light };
         }
     }
+
+    /// What the light samples bring that were chosen, unless something is in the way.
+    pub(super) fn chosen_light(
+        &mut self,
+        n: usize,
+        scene: &Scene,
+        samples: &[BatchSample],
+        radiance: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) {
+        let asking = self.ask(n, |b, i| b.chosen.has_one(i));
+        self.test_light(asking, Whose::Chosen, scene, samples, stats);
+        for (k, &i) in self.asking[..asking].iter().enumerate() {
+            let (light, s) = (self.chosen.light(i as usize), self.sample[i as usize] as usize);
+            radiance[s] += if self.rays.is_blocked(k) { SampledSpectrum::ZERO } else { light };
+        }
+    }
+
+    /// Puts down the lanes that ask what is in the way of their light. How many do.
+    fn ask(&mut self, n: usize, asks: impl Fn(&Self, usize) -> bool) -> usize {
+        // Put down in any case, and kept where it counts: a branch would be guessed wrong often.
+        let mut asking = 0;
+        for i in 0..n {
+            self.asking[asking] = i as u32;
+            asking += usize::from(asks(self, i));
+        }
+        asking
+    }
+
+    /// Finds out whether anything is in the way of the light of the lanes that ask.
+    fn test_light(
+        &mut self,
+        asking: usize,
+        whose: Whose,
+        scene: &Scene,
+        samples: &[BatchSample],
+        stats: &mut RenderStats,
+    ) {
+        let (targets, lights, is_delta) = match whose {
+            Whose::Drawn => (&self.targets, &self.picked, &self.is_delta),
+            Whose::Chosen => (&self.chosen.targets, &self.chosen.picked, &self.chosen.is_delta),
+        };
+        self.rays.clear();
+        for &i in &self.asking[..asking] {
+            targets.put_ray(i as usize, self.time[i as usize], &mut self.rays);
+        }
+        stats.shadow_rays += asking as u64;
+        scene.geometry.occluded_rays(&mut self.rays, &scene.alpha());
+        if !scene.materials.may_pass() {
+            return;
+        }
+        // Lights that no ray meets are seen through interfaces: `Scene::is_occluded`.
+        for (k, &i) in self.asking[..asking].iter().enumerate() {
+            let i = i as usize;
+            if is_delta[i] != 0 && self.rays.is_blocked(k) {
+                let lambda = &samples[self.sample[i] as usize].lambda;
+                let (light, at) = (scene.lights.get(LightId(lights[i])), self.at.reference(i));
+                let sample = light.sample(&at, self.light.uv(i), lambda, MODE);
+                self.rays.set_blocked(k, sample.is_none_or(|sample| scene.is_occluded(&self.interaction(i), &sample)));
+            }
+        }
+    }
+}
+
+/// Light samples of a batch's paths.
+enum Whose {
+    /// Those that were drawn last.
+    Drawn,
+    /// Those that were chosen among several.
+    Chosen,
 }

@@ -39,8 +39,7 @@ const AHEAD: usize = 8;
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
     pub(crate) fn has_stages(&self, scene: &Scene) -> bool {
-        (self.light_splits == 1 || !scene.materials.may_pass())
-            && !self.regularize
+        !self.regularize
             && scene.layers.channels() == 0
             && StreamLanes::can_hold(&scene.sampler.stream([0, 0], 0))
     }
@@ -76,8 +75,9 @@ impl PathIntegrator {
             if n == 0 || self.is_at_limit(depth) {
                 return;
             }
-            b.draw(n, depth, scene, self.plays_roulette(depth + 1));
-            b.light_samples(n, depth, self.light_splits_at(depth), scene, samples, radiance, stats);
+            let choice = self.light_choice_at(depth);
+            b.draw(n, depth, scene, choice, self.plays_roulette(depth + 1));
+            b.light_samples(n, choice, scene, samples, radiance, stats);
             b.scatter(n, scene);
             depth += 1;
             n = self.go_on(b, n, depth, scene, stats);
@@ -253,7 +253,7 @@ impl PathIntegrator {
         stats.longest_path = stats.longest_path.max(if directions > 0 { depth } else { 0 });
         let n = b.leave(n, scene);
         stats.bounce_rays += n as u64;
-        b.light_splits = self.light_splits_at(depth - 1);
+        b.light_splits = self.light_choice_at(depth - 1).splits;
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, n, scene);
         }

@@ -4,6 +4,7 @@
 use super::batch::{Batch, Scattering, Surface};
 use crate::camera_samples::{BatchSample, Beginnings};
 use crate::integrator::RenderStats;
+use crate::light_samples::LightChoice;
 use crate::path::{PathIntegrator, survival_probability};
 use crate::shared_path::blocks::{Blocks, FirstScattering, Kind, Leaving};
 use crate::shared_path::sky::{Glimpse, SharedSky};
@@ -113,9 +114,10 @@ impl PathIntegrator {
         if self.is_at_limit(0) || n == 0 {
             return;
         }
-        b.draw(n, 0, scene, sky.is_some());
+        let choice = self.light_choice_at(0);
+        b.draw(n, 0, scene, choice, sky.is_some());
         b.shared_sky = sky.map(|sky| sky.id);
-        b.light_samples(n, 0, self.light_splits_at(0), scene, samples, &mut blocks.own, stats);
+        b.light_samples(n, choice, scene, samples, &mut blocks.own, stats);
         if let Some(sky) = sky {
             b.share_sky_samples(sky, blocks);
         }
@@ -154,7 +156,7 @@ impl PathIntegrator {
         }
         if !self.is_at_limit(1) && n > 0 {
             self.share_second(b, n, blocks);
-            b.draw(n, 1, scene, true);
+            b.draw(n, 1, scene, LightChoice::ONE, true);
             self.light_at_second(b, n, scene, samples, blocks, stats);
             b.scatter(n, scene);
             for (s, kind) in blocks.kinds.iter().enumerate() {
@@ -190,7 +192,7 @@ impl PathIntegrator {
             Some((throughput, scale))
         });
         let n = b.leave(n, scene);
-        b.light_splits = self.light_splits_at(0);
+        b.light_splits = self.light_choice_at(0).splits;
         scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         match sky {
             Some(sky) => b.look_at_sky(n, sky, blocks),
@@ -243,7 +245,7 @@ impl PathIntegrator {
         stats: &mut RenderStats,
     ) {
         b.pick_lights(n, scene);
-        if !b.sample_picked(n, 1, scene, samples, &mut blocks.rest, stats) {
+        if !b.sample_picked(n, scene, samples) {
             return;
         }
         b.rays.clear();
@@ -276,7 +278,7 @@ impl PathIntegrator {
             }
         }
         blocks.incoming.truncate(stay);
-        b.arriving_light(n, scene, &mut blocks.rest, stats);
+        b.arriving_light(n, scene, samples, &mut blocks.rest, stats);
     }
 
     /// Plays roulette at second vertices, traces the rays of paths that go on, and asks what those of lamps see that others see by BSDFs. How

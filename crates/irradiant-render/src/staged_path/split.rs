@@ -1,22 +1,77 @@
 //! Several light samples at a vertex, as [`split_light`](crate::light_samples) takes them: the first of all paths, then the second of all.
 
-use super::batch::Batch;
+use super::batch::{Batch, SpectrumLanes};
+use super::kernels::Choose;
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
-use crate::light_samples::{all_are_sampled, samples_by_chance};
+use crate::light_samples::{LightChoice, Reservoir, all_are_sampled, samples_by_chance};
 use irradiant_core::interaction::LightId;
+use irradiant_core::light::TargetLanes;
 use irradiant_core::light_sampler::{PickedLight, PointLanes};
 use irradiant_core::scene::Scene;
-use irradiant_math::lanes::LANES;
+use irradiant_math::lanes::{Floats, LANES};
 use irradiant_spectrum::SampledSpectrum;
 
+/// The light samples that were chosen among several, one of each path.
+#[repr(C, align(64))]
+pub(super) struct ChosenLanes {
+    /// Sums and numbers by which they are chosen ([`Reservoir`]).
+    number: Floats,
+    total: Floats,
+    kept: Floats,
+    pub targets: TargetLanes,
+    pub picked: [u32; LANES],
+    pub is_delta: [u32; LANES],
+    pub brought: SpectrumLanes,
+}
+
+impl ChosenLanes {
+    pub const NONE: Self = Self {
+        number: [0.0; LANES],
+        total: [0.0; LANES],
+        kept: [0.0; LANES],
+        targets: TargetLanes::NONE,
+        picked: [0; LANES],
+        is_delta: [0; LANES],
+        brought: SpectrumLanes::ZERO,
+    };
+
+    /// None yet.
+    fn begin(&mut self, n: usize, numbers: &Floats) {
+        self.number[..n].copy_from_slice(&numbers[..n]);
+        self.total[..n].fill(0.0);
+        self.kept[..n].fill(0.0);
+    }
+
+    /// [`Reservoir::takes`] of a lane.
+    #[inline(always)]
+    pub fn takes(&mut self, i: usize, weight: f32) -> bool {
+        let mut reservoir = Reservoir { number: self.number[i], total: self.total[i], kept: self.kept[i] };
+        let is_taken = reservoir.takes(weight);
+        (self.number[i], self.total[i], self.kept[i]) = (reservoir.number, reservoir.total, reservoir.kept);
+        is_taken
+    }
+
+    /// Whether there is one.
+    #[inline(always)]
+    pub fn has_one(&self, i: usize) -> bool {
+        self.kept[i] != 0.0
+    }
+
+    /// What it brings.
+    #[inline(always)]
+    pub fn light(&self, i: usize) -> SampledSpectrum {
+        let reservoir = Reservoir { number: self.number[i], total: self.total[i], kept: self.kept[i] };
+        self.brought.at(i) * reservoir.stands_for()
+    }
+}
+
 impl Batch {
-    /// Light samples of each path, the choice of the light split into `splits` strata, more than one.
+    /// Light samples of each path, the choice of the light split into several strata.
     pub(super) fn split_light_samples(
         &mut self,
         n: usize,
-        depth: u32,
-        splits: u32,
+        LightChoice { splits, is_resampled }: LightChoice,
         scene: &Scene,
         samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
@@ -26,15 +81,26 @@ impl Batch {
         let mut sums = [SampledSpectrum::ZERO; LANES];
         let sums = &mut sums[..radiance.len()];
         self.seek_light(n);
+        if is_resampled {
+            let [_, _, _, numbers] = &self.light.0;
+            self.chosen.begin(n, numbers);
+        }
+        let mut candidates = |b: &mut Self| {
+            if !b.sample_picked(n, scene, samples) {
+            } else if is_resampled {
+                b.bring_alone();
+                scene.geometry.level().run(Choose(b, n));
+            } else {
+                b.arriving_light(n, scene, samples, sums, stats);
+            }
+        };
         if all_are_sampled(scene, splits) {
             let seeking = std::mem::take(&mut self.seeking);
             for light in 0..scene.lights.len() as u32 {
                 for &i in &seeking {
                     self.pick(i as usize, PickedLight { id: LightId(light), pmf: 1.0 }, 1.0, splits);
                 }
-                if self.sample_picked(n, depth, scene, samples, sums, stats) {
-                    self.arriving_light(n, scene, sums, stats);
-                }
+                candidates(self);
             }
             self.seeking = seeking;
         } else {
@@ -48,10 +114,12 @@ impl Batch {
                         self.pick(i, picked, times as f32 / splits as f32, splits);
                     }
                 }
-                if self.sample_picked(n, depth, scene, samples, sums, stats) {
-                    self.arriving_light(n, scene, sums, stats);
-                }
+                candidates(self);
             }
+        }
+        if is_resampled {
+            self.chosen_light(n, scene, samples, radiance, stats);
+            return;
         }
         for i in 0..n {
             let s = self.sample[i] as usize;
