@@ -356,6 +356,41 @@ impl Brought {
 mod tests {
     use super::*;
 
+    /// Each weight is kept in proportion, and counts for all: 10^5 marks side by side, so that shares are right to 10^-4. What is left of a mark
+    /// is spread evenly again.
+    #[test]
+    fn reservoirs_keep_weights_in_proportion() {
+        let weights = [0.0, 3.0, 0.5, 0.0, 1e-3, 6.5, 2.0];
+        let sum: f32 = weights.iter().sum();
+        let (n, mut kept, mut left) = (100_000, [0; 7], [0; 10]);
+        for i in 0..n {
+            let mut reservoir = Reservoir::new((i as f32 + 0.5) / n as f32);
+            let mut last = None;
+            for (k, weight) in weights.into_iter().enumerate() {
+                if reservoir.takes(weight) {
+                    last = Some(k);
+                }
+            }
+            let last = last.expect("there are weights above 0");
+            kept[last] += 1;
+            left[(reservoir.number * 10.0) as usize] += 1;
+            assert!((reservoir.stands_for() * weights[last] / sum - 1.0).abs() < 1e-5, "{reservoir:?}");
+        }
+        for (kept, weight) in kept.into_iter().zip(weights) {
+            assert!((kept as f32 / n as f32 - weight / sum).abs() < 1e-4, "{kept} of {weight}");
+        }
+        assert!(left.into_iter().all(|left| (left as f32 / n as f32 - 0.1).abs() < 2e-3), "{left:?}");
+        // Nothing has no reservoir, and what is wrong is not hidden.
+        let mut empty = Reservoir::new(0.3);
+        assert!(!empty.takes(0.0) && empty.kept == 0.0);
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let mut reservoir = Reservoir::new(0.9);
+            assert!(reservoir.takes(1.0) && reservoir.takes(wrong));
+            reservoir.takes(2.0);
+            assert!(!reservoir.stands_for().is_finite(), "{reservoir:?}");
+        }
+    }
+
     #[test]
     fn strata_are_1_to_64() {
         let check = |splits| check_splits("light_splits", splits);

@@ -37,7 +37,8 @@ pub struct PathIntegrator {
     pub roulette: Roulette,
     /// Strata of the choice of a light at the first surface, 1 to 64: each light that is picked is tested.
     pub light_splits: u32,
-    /// The same at the first two surfaces, where nothing else is said, but one of those lights is tested.
+    /// Lights of which one is tested at the first two surfaces, where nothing else is said, 1 to 64; all where there are no more than four times
+    /// as many.
     pub light_candidates: u32,
 }
 
@@ -140,18 +141,21 @@ pub(crate) const fn lights_option(default: u32) -> OptionEntry {
     }
 }
 
-/// Of how many lights the best, by chance, is tested at the first two surfaces.
-const CANDIDATES: u32 = 4;
+/// Of how many lights, picked by the light sampler, one is tested. (Figures: decision 8.)
+const CANDIDATES: u32 = 2;
 
-/// So many surfaces choose among candidates; what later ones bring is not worth it (decision 8).
+/// As long as taking each of so many times as many lights in turn costs as much as picking them.
+const TURNS_PER_PICK: usize = 4;
+
+/// So many surfaces choose among candidates; what others gain is not worth the time.
 const CHOOSING: u32 = 2;
 
 /// Of how many lights one is tested.
-pub(crate) const CANDIDATES_OPTION: OptionEntry = OptionEntry {
+const CANDIDATES_OPTION: OptionEntry = OptionEntry {
     name: "candidates",
     range: OptionRange::Count(1, MOST_SPLITS),
     default: Value::Count(CANDIDATES),
-    doc: "light samples at the first two surfaces of which one is tested by a ray, chosen at random by what each would bring if nothing stood in the way (A59); the first surface has those of `lights`, if that is more than 1",
+    doc: "lights of which one is tested by a ray at the first two surfaces, chosen at random by what each would bring if nothing stood in the way (A59): so many that are picked, or all if there are no more than four times as many; 1: no choice; `lights` above 1 goes before at the first surface",
 };
 
 /// By name.
@@ -284,14 +288,16 @@ impl PathIntegrator {
 
     /// How lights are sampled at the surface after so many scattering events.
     #[inline]
-    pub(crate) fn light_choice_at(&self, depth: u32) -> LightChoice {
+    pub(crate) fn light_choice_at(&self, scene: &Scene, depth: u32) -> LightChoice {
         if depth == 0 && self.light_splits > 1 {
-            LightChoice { splits: self.light_splits, is_resampled: false }
-        } else if depth < CHOOSING {
-            LightChoice { splits: self.light_candidates, is_resampled: true }
-        } else {
-            LightChoice::ONE
+            return LightChoice { splits: self.light_splits, is_resampled: false };
         }
+        let (lights, candidates) = (scene.lights.len(), self.light_candidates);
+        if depth >= CHOOSING || candidates == 1 || lights <= 1 {
+            return LightChoice::ONE;
+        }
+        let takes_turns = lights <= (TURNS_PER_PICK * candidates as usize).min(MOST_SPLITS as usize);
+        LightChoice { splits: if takes_turns { lights as u32 } else { candidates }, is_resampled: true }
     }
 
     /// What the camera ray sees, by one random path. Fills the layers of the film at the first surface.
@@ -409,7 +415,7 @@ impl PathIntegrator {
                     lambda,
                     &draws,
                     run,
-                    self.light_choice_at(depth),
+                    self.light_choice_at(scene, depth),
                     None,
                     depth,
                     stats,
@@ -484,7 +490,7 @@ impl PathIntegrator {
         } else {
             sample.pdf
         };
-        let light_splits = self.light_choice_at(walk.depth - 1).splits;
+        let light_splits = self.light_choice_at(scene, walk.depth - 1).splits;
         walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular, light_splits });
         walk.ray = at.spawn_ray(sample.wi);
         walk.escape_place = scene.lights.place_of_escape(sample.wi);

@@ -28,10 +28,15 @@ fn allocations(job: &Job) -> (u64, RenderStats) {
     (counted.count_total, stats)
 }
 
+/// So many lamps that candidates are picked among them.
+fn many_lamps() -> String {
+    (0..20).map(|i| format!("LightSource \"point\" \"point3 from\" [ {i} 2 0 ]\n")).collect::<String>() + FLOOR + "Shape \"sphere\"\n"
+}
+
 #[test]
 fn paths_ask_for_no_memory() {
-    for scene in SCENES {
-        let text = HEAD.to_owned() + &scene.replace("FLOOR", FLOOR);
+    for scene in SCENES.map(|scene| scene.replace("FLOOR", FLOOR)).into_iter().chain([many_lamps()]) {
+        let text = HEAD.to_owned() + &scene;
         let file = load_text("scene", &text, ".").unwrap_or_else(|e| panic!("{e}"));
         for color in [ColorMode::Rgb, ColorMode::Spectral] {
             for name in ["path", "sharedpath", "simplepath"] {

@@ -97,6 +97,8 @@ fn several_light_samples() {
     for light_splits in [3, 8] {
         assert_same_by(&PathIntegrator { light_splits, ..PathIntegrator::default() }, &lamps_of_all_kinds());
     }
+    // One lamp only, at every surface.
+    assert_same_by(&PathIntegrator { light_candidates: 1, ..PathIntegrator::default() }, &lamps_of_all_kinds());
     // One lamp has one sample, but its light is weighed as one of all that are sampled.
     let text = format!("{HEAD}{ROOM}{}", ceiling_lamp());
     assert_same_by(&PathIntegrator { light_splits: 8, ..PathIntegrator::default() }, &text);
@@ -147,7 +149,10 @@ fn hundreds_of_lamps() {
             }
         })
         .collect();
-    assert_same(&format!("{HEAD}{ROOM}{}{lamps}", plate(0.1)));
+    let text = format!("{HEAD}{ROOM}{}{lamps}", plate(0.1));
+    for light_candidates in [1, 2, 5] {
+        assert_same_by(&PathIntegrator { light_candidates, ..PathIntegrator::default() }, &text);
+    }
     // With lights at infinity, which are picked before the tree is asked.
     assert_same(&format!(
         "{HEAD}LightSource \"distant\" \"rgb L\" [ .5 .5 .5 ]\nLightSource \"infinite\" \"rgb L\" [ .1 .2 .3 ]\n{ROOM}{}{lamps}",
@@ -193,6 +198,17 @@ fn under_an_image_of_the_sky() {
     let veil = "MakeNamedMaterial \"veil\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"none\" \"string type\" \"interface\"\nAttributeBegin\nMaterial \"mix\" \"string materials\" [ \"veil\" \"none\" ] \"float amount\" 0.5\nTranslate 0 1 0\nShape \"sphere\" \"float radius\" 6\nAttributeEnd\n";
     assert_same(&format!("{HEAD}{sky}{veil}{ROOM}"));
     std::fs::remove_file(&file).expect("removed");
+}
+
+// No ray meets these lights: their samples are asked for what lets them pass.
+#[test]
+fn lights_that_no_ray_meets_through_surfaces_that_may_not_be_there() {
+    let veil = "MakeNamedMaterial \"veil\" \"string type\" \"diffuse\"\nMakeNamedMaterial \"none\" \"string type\" \"interface\"\nAttributeBegin\nMaterial \"mix\" \"string materials\" [ \"veil\" \"none\" ] \"float amount\" 0.5\nTranslate 0 1 0\nShape \"sphere\" \"float radius\" 0.7\nAttributeEnd\n";
+    let lights = "LightSource \"point\" \"rgb I\" [ 3 2 2 ] \"point3 from\" [ 0.1 1 -.2 ]\nLightSource \"distant\" \"rgb L\" [ 1 1 2 ] \"point3 from\" [ .1 .2 -1 ] \"point3 to\" [ 0 0 0 ]\nLightSource \"spot\" \"rgb I\" [ 5 9 2 ] \"point3 from\" [ 0 1.2 .1 ] \"point3 to\" [ .3 0 -.3 ]\n";
+    let text = format!("{HEAD}{lights}{ROOM}{}{veil}{}", plate(0.2), ceiling_lamp());
+    for (light_splits, light_candidates) in [(1, 1), (1, 2), (3, 2), (8, 1)] {
+        assert_same_by(&PathIntegrator { light_splits, light_candidates, ..PathIntegrator::default() }, &text);
+    }
 }
 
 #[test]

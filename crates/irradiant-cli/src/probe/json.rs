@@ -42,6 +42,7 @@ fn story(job: &Job, s: &PathStory, bounces: Option<&RangeInclusive<u32>>) -> Val
                 LightOutcome::Lit => "lit",
                 LightOutcome::Blocked => "blocked",
                 LightOutcome::Black => "black",
+                LightOutcome::PassedOver => "passed over",
             };
             json!({ "light": l.light.0, "to": end(l.to), "outcome": outcome })
         });

@@ -65,6 +65,9 @@ fn one(job: &Job, story: &PathStory, bounces: Option<&RangeInclusive<u32>>) {
                 LightOutcome::Lit => {}
                 LightOutcome::Blocked => println!("light        sample of light {}: blocked", tried.light.0),
                 LightOutcome::Black => println!("light        sample of light {}: nothing from there", tried.light.0),
+                LightOutcome::PassedOver => {
+                    println!("light        sample of light {}: a candidate, another one was tested", tried.light.0);
+                }
             }
         }
         light_from(i as u32 + 1).filter(|f| !met(f)).for_each(light);

@@ -38,6 +38,8 @@ pub enum LightOutcome {
     Blocked,
     /// The light does not shine here, or the surface does not scatter it.
     Black,
+    /// Another candidate was tested in its place.
+    PassedOver,
 }
 
 /// The light that a vertex asked.
@@ -192,8 +194,17 @@ struct Recorder {
     vertices: Vec<Interaction>,
     scatterings: Vec<Scattering>,
     contributions: Vec<Contribution>,
+    tested: Vec<Tested>,
     escape: Option<Vec3>,
     end: Option<PathEnd>,
+}
+
+/// A light sample that was tested.
+#[derive(Clone, Copy, Debug)]
+struct Tested {
+    depth: u32,
+    light: LightId,
+    stands_for: f32,
 }
 
 impl PathRecorder for Recorder {
@@ -203,6 +214,10 @@ impl PathRecorder for Recorder {
 
     fn escape(&mut self, _depth: u32, direction: Vec3) {
         self.escape = Some(direction);
+    }
+
+    fn light_tested(&mut self, depth: u32, light: LightId, stands_for: f32) {
+        self.tested.push(Tested { depth, light, stands_for });
     }
 
     fn contribution(&mut self, c: &Contribution) {
@@ -255,12 +270,14 @@ impl Bookkeeper<'_> {
             let scattering = recorder.scatterings.get(depth as usize);
             let asks = bsdf.flags().is_non_specular() && integrator.max_depth.is_none_or(|limit| depth < limit);
             if asks {
-                let choice = integrator.light_choice_at(depth);
+                let choice = integrator.light_choice_at(scene, depth);
                 let picked = PickedLights::of(scene, &at.reference(), &self.stream.light(depth), choice.splits);
                 for (light, share) in picked.iter() {
                     let c = found(Technique::LightSample, depth + 1).find(|c| c.light == light.id);
-                    let pmf = f64::from(light.pmf) / f64::from(share);
-                    let tried = self.light(&at, &bsdf, &lambda, depth, light.id, pmf, c, story);
+                    let tested = recorder.tested.iter().find(|t| t.depth == depth && t.light == light.id);
+                    let stands_for = tested.map_or(1.0, |t| t.stands_for);
+                    let pmf = f64::from(light.pmf) / (f64::from(share) * f64::from(stands_for));
+                    let tried = self.light(&at, &bsdf, &lambda, depth, light.id, pmf, tested.is_some(), c, story);
                     story.vertices[depth as usize].lights.extend(tried);
                 }
             }
@@ -293,7 +310,7 @@ impl Bookkeeper<'_> {
         Account { value, density, density_in_weight }
     }
 
-    /// Asks a light of the vertex again, which stands for 1/`pmf` lights.
+    /// Asks a light of the vertex again, which stands for 1/`pmf` lights if it was tested.
     fn light(
         &self,
         at: &Interaction,
@@ -302,6 +319,7 @@ impl Bookkeeper<'_> {
         depth: u32,
         id: LightId,
         pmf: f64,
+        tested: bool,
         found: Option<&Contribution>,
         story: &mut PathStory,
     ) -> Option<LightTry> {
@@ -324,7 +342,8 @@ impl Bookkeeper<'_> {
                 LightOutcome::Lit
             }
             None if f.is_black() || arriving.is_black() => LightOutcome::Black,
-            None => LightOutcome::Blocked,
+            None if tested => LightOutcome::Blocked,
+            None => LightOutcome::PassedOver,
         };
         Some(LightTry { light: id, to, outcome })
     }

@@ -338,7 +338,7 @@ impl SharedPathIntegrator {
         let sky = looks.sky.filter(|_| gains(&bsdf));
         if bsdf.flags().is_non_specular() {
             let (draws, one) = (stream.light(0), SampledSpectrum::ONE);
-            let choice = path.light_choice_at(0);
+            let choice = path.light_choice_at(scene, 0);
             if let Some(sky) = sky {
                 looks.light = Some(sky_sample(scene, &at, &draws, choice.splits, sky));
             }

@@ -43,7 +43,7 @@ impl<'a> SharedSky<'a> {
     pub fn of(scene: &'a Scene, path: &PathIntegrator, tests: u32) -> Option<Self> {
         let (id, sky) = scene.lights.only_sky().filter(|_| tests > 0)?;
         let anywhere = ReferencePoint { p: Point3::ZERO, p_error: Vec3::ZERO, n: Normal3::ZERO, ns: Normal3::ZERO };
-        Some(Self { id, sky, times: samples_of(scene, &anywhere, id, path.light_choice_at(0).splits), tests })
+        Some(Self { id, sky, times: samples_of(scene, &anywhere, id, path.light_choice_at(scene, 0).splits), tests })
     }
 
     /// What a light sample counts for that stands for a `share` of all and was picked with the chance `pmf`.

@@ -75,7 +75,7 @@ impl PathIntegrator {
             if n == 0 || self.is_at_limit(depth) {
                 return;
             }
-            let choice = self.light_choice_at(depth);
+            let choice = self.light_choice_at(scene, depth);
             b.draw(n, depth, scene, choice, self.plays_roulette(depth + 1));
             b.light_samples(n, choice, scene, samples, radiance, stats);
             b.scatter(n, scene);
@@ -253,7 +253,7 @@ impl PathIntegrator {
         stats.longest_path = stats.longest_path.max(if directions > 0 { depth } else { 0 });
         let n = b.leave(n, scene);
         stats.bounce_rays += n as u64;
-        b.light_splits = self.light_choice_at(depth - 1).splits;
+        b.light_splits = self.light_choice_at(scene, depth - 1).splits;
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, n, scene);
         }

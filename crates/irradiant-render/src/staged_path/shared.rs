@@ -114,7 +114,7 @@ impl PathIntegrator {
         if self.is_at_limit(0) || n == 0 {
             return;
         }
-        let choice = self.light_choice_at(0);
+        let choice = self.light_choice_at(scene, 0);
         b.draw(n, 0, scene, choice, sky.is_some());
         b.shared_sky = sky.map(|sky| sky.id);
         b.light_samples(n, choice, scene, samples, &mut blocks.own, stats);
@@ -192,7 +192,7 @@ impl PathIntegrator {
             Some((throughput, scale))
         });
         let n = b.leave(n, scene);
-        b.light_splits = self.light_choice_at(0).splits;
+        b.light_splits = self.light_choice_at(scene, 0).splits;
         scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         match sky {
             Some(sky) => b.look_at_sky(n, sky, blocks),
