@@ -92,8 +92,10 @@ pub type Contestants = Vec<(String, Box<dyn Contestant>)>;
 pub fn all(setting: &Setting, folder: &Path) -> (Contestants, Vec<String>) {
     let mut contestants: Contestants = Vec::new();
     let mut missing = Vec::new();
-    let ours: [(&str, &[&str]); 3] = [
+    let ours: [(&str, &[&str]); 4] = [
         ("rgb", &["--color", "rgb"]),
+        // One light sample at each surface, as Mitsuba's `path` takes: for raw paths per second.
+        ("one light", &["--color", "rgb", "--estimator", "candidates=1"]),
         ("shared", &["--color", "rgb", "--integrator", "sharedpath"]),
         ("spectral", &["--color", "spectral"]),
     ];

@@ -112,7 +112,7 @@ fn integrators_are_listed_with_their_options_and_named_in_the_header() {
         let bytes = std::fs::read(folder.0.join(name)).expect("written");
         assert!(
             String::from_utf8_lossy(&bytes)
-                .contains("path regularize=false roulette=throughput q=0.1 lights=1 lightsampler=power"),
+                .contains("path regularize=false roulette=throughput q=0.1 lights=1 candidates=2 lightsampler=power"),
             "{name}"
         );
     }

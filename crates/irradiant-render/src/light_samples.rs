@@ -47,6 +47,21 @@ pub(crate) struct LightChoice {
 impl LightChoice {
     /// One light.
     pub const ONE: Self = Self { splits: 1, is_resampled: false };
+
+    /// How often a light is tested at a vertex, as a weight: the average number where a sampler picks a light in strata side by side, a little
+    /// more where it does not (`power`); of candidates, as if each were as good as the others.
+    #[inline]
+    pub fn tests_of(self, scene: &Scene, at: &ReferencePoint, light: LightId) -> f32 {
+        let pmf = if all_are_sampled(scene, self.splits) { 1.0 } else { scene.light_sampler.pmf(at, light) };
+        self.tests_by_chance(pmf)
+    }
+
+    /// As [`LightChoice::tests_of`], of a light that is picked with the chance `pmf`, 1 where all are.
+    #[inline(always)]
+    pub fn tests_by_chance(self, pmf: f32) -> f32 {
+        let picks = (pmf * self.splits as f32).min(1.0);
+        if self.is_resampled { picks / self.splits as f32 } else { picks }
+    }
 }
 
 /// A sample of the light that arrives straight from lamps, unless something is in the way.
@@ -89,19 +104,6 @@ fn sample_light(
     }?;
     let radiance = sample.radiance * scene.opacity(&sample);
     Some(ArrivingLight { light, radiance, pdf: pmf * sample.pdf, sample })
-}
-
-/// How often a light is sampled at a vertex, as a weight: the average number where a sampler picks a light in strata side by side, a little
-/// more where it does not (`power`).
-#[inline]
-pub(crate) fn samples_of(scene: &Scene, at: &ReferencePoint, light: LightId, splits: u32) -> f32 {
-    if all_are_sampled(scene, splits) { 1.0 } else { samples_by_chance(scene.light_sampler.pmf(at, light), splits) }
-}
-
-/// As [`samples_of`], of a light that is picked with the chance `pmf`.
-#[inline]
-pub(crate) fn samples_by_chance(pmf: f32, splits: u32) -> f32 {
-    (pmf * splits as f32).min(1.0)
 }
 
 /// Whether there is a stratum for each light.
@@ -153,7 +155,7 @@ fn split_light<R: PathRecorder>(
     lambda: &Wavelengths,
     draws: &LightDraws,
     prepared: Option<PixelRun>,
-    LightChoice { splits, is_resampled }: LightChoice,
+    choice: LightChoice,
     except: Option<LightId>,
     depth: u32,
     stats: &mut RenderStats,
@@ -161,13 +163,13 @@ fn split_light<R: PathRecorder>(
 ) -> SampledSpectrum {
     let mut sum = SampledSpectrum::ZERO;
     let (mut chosen, mut reservoir) = (None, Reservoir::new(draws.resample));
-    for (picked, share) in PickedLights::of(scene, &at.reference(), draws, splits).iter() {
-        let samples = samples_by_chance(picked.pmf, splits);
+    for (picked, share) in PickedLights::of(scene, &at.reference(), draws, choice.splits).iter() {
+        let samples = choice.tests_by_chance(picked.pmf);
         if except != Some(picked.id)
             && let Some(arriving) = sample_light(scene, at, lambda, picked, draws.uv, prepared)
             && let Some(brought) = scattered(at, bsdf, throughput, arriving, samples, share)
         {
-            if !is_resampled {
+            if !choice.is_resampled {
                 sum += brought.unless_blocked(scene, at, 1.0, depth, stats, recorder);
             } else if reservoir.takes(brought.radiance.average()) {
                 chosen = Some(brought);

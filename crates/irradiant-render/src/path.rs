@@ -10,7 +10,7 @@
 
 use crate::camera_samples::{CameraSample, SampleBatch, for_each_first_hit};
 use crate::integrator::{Integrator, Limit, RenderStats, Renderer, WorkUnit};
-use crate::light_samples::{LightChoice, MOST_SPLITS, check_splits, direct_light, samples_of};
+use crate::light_samples::{LightChoice, MOST_SPLITS, check_splits, direct_light};
 use crate::record::{Contribution, NoRecord, PathEnd, PathRecorder, Scattering, Technique};
 use crate::registry::{OptionEntry, OptionRange, Options, Value, words};
 use crate::staged_path::Batch;
@@ -64,7 +64,13 @@ words! {
 
 impl Default for PathIntegrator {
     fn default() -> Self {
-        Self { max_depth: None, regularize: false, roulette: Roulette::default(), light_splits: 1, light_candidates: CANDIDATES }
+        Self {
+            max_depth: None,
+            regularize: false,
+            roulette: Roulette::default(),
+            light_splits: 1,
+            light_candidates: CANDIDATES,
+        }
     }
 }
 
@@ -155,7 +161,7 @@ const CANDIDATES_OPTION: OptionEntry = OptionEntry {
     name: "candidates",
     range: OptionRange::Count(1, MOST_SPLITS),
     default: Value::Count(CANDIDATES),
-    doc: "lights of which one is tested by a ray at the first two surfaces, chosen at random by what each would bring if nothing stood in the way (A59): so many that are picked, or all if there are no more than four times as many; 1: no choice; `lights` above 1 goes before at the first surface",
+    doc: "lights of which one is tested by a ray at the first two surfaces, drawn in proportion to what each would bring if nothing stood in the way (A59): so many that are picked, or all lights if these are at most four times as many; 1: no choice. At the first surface `lights` goes before, if above 1",
 };
 
 /// By name.
@@ -215,8 +221,8 @@ pub(crate) struct Previous {
     pub reference: ReferencePoint,
     pub bsdf_pdf: f32,
     pub specular: bool,
-    /// Strata of the choice of a light there.
-    pub light_splits: u32,
+    /// How lights are sampled there.
+    pub light_choice: LightChoice,
 }
 
 /// A path on its way: the next ray, what it meets, and what the path carries there.
@@ -272,7 +278,13 @@ impl PathIntegrator {
             Ends::Throughput => Roulette::Throughput,
             Ends::Constant => Roulette::Constant(options.number("q")),
         };
-        Self { max_depth, regularize: options.flag("regularize"), roulette, light_splits: options.count("lights"), light_candidates: options.count("candidates") }
+        Self {
+            max_depth,
+            regularize: options.flag("regularize"),
+            roulette,
+            light_splits: options.count("lights"),
+            light_candidates: options.count("candidates"),
+        }
     }
 
     /// Whether a path ends at a surface after so many scattering events.
@@ -490,8 +502,8 @@ impl PathIntegrator {
         } else {
             sample.pdf
         };
-        let light_splits = self.light_choice_at(scene, walk.depth - 1).splits;
-        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular, light_splits });
+        let light_choice = self.light_choice_at(scene, walk.depth - 1);
+        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf, specular, light_choice });
         walk.ray = at.spawn_ray(sample.wi);
         walk.escape_place = scene.lights.place_of_escape(sample.wi);
         stats.bounce_rays += 1;
@@ -518,7 +530,7 @@ impl PathIntegrator {
             }
             let light_pdf = previous
                 .filter(|p| !p.specular)
-                .map_or(0.0, |p| samples_of(scene, &p.reference, light, p.light_splits) * pdf);
+                .map_or(0.0, |p| p.light_choice.tests_of(scene, &p.reference, light) * pdf);
             let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };
             let radiance = walk.throughput * emitted * weight;
@@ -553,7 +565,7 @@ impl PathIntegrator {
             return SampledSpectrum::ZERO;
         }
         let light_pdf = previous.filter(|p| !p.specular).map_or(0.0, |p| {
-            samples_of(scene, &p.reference, light, p.light_splits)
+            p.light_choice.tests_of(scene, &p.reference, light)
                 * scene.lights.get(light).pdf_hit(&p.reference, ray.d, &at.into())
         });
         let bsdf_pdf = previous.map_or(0.0, |p| p.bsdf_pdf);

@@ -30,7 +30,9 @@ fn allocations(job: &Job) -> (u64, RenderStats) {
 
 /// So many lamps that candidates are picked among them.
 fn many_lamps() -> String {
-    (0..20).map(|i| format!("LightSource \"point\" \"point3 from\" [ {i} 2 0 ]\n")).collect::<String>() + FLOOR + "Shape \"sphere\"\n"
+    (0..20).map(|i| format!("LightSource \"point\" \"point3 from\" [ {i} 2 0 ]\n")).collect::<String>()
+        + FLOOR
+        + "Shape \"sphere\"\n"
 }
 
 #[test]

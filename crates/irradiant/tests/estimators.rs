@@ -180,7 +180,8 @@ fn choosing_a_light_among_candidates_changes_nothing_but_noise() {
     // that what seems best is often not seen. Directions find what light samples find, and three surfaces see light, of which two choose. Seen to
     // fail: with chances taken by brightness and corrected by the largest component, with the share of strata left out, and
     // with the weight of one candidate's light samples as if it were always drawn.
-    let board = diffuse(0.3, 0.2, 0.1) + &quad([[-3.0, 0.6, -1.5], [0.0, 0.6, -1.5], [0.0, 0.6, 0.4], [-3.0, 0.6, 0.4]]);
+    let board =
+        diffuse(0.3, 0.2, 0.1) + &quad([[-3.0, 0.6, -1.5], [0.0, 0.6, -1.5], [0.0, 0.6, 0.4], [-3.0, 0.6, 0.4]]);
     let more: String = (0..10)
         .map(|i| ball_lamp([0.5 * i as f32 - 2.3, 0.1 * (i * 7 % 10) as f32, -1.0], 0.08, 1.0 + (i * 3 % 7) as f32))
         .collect();
@@ -188,8 +189,9 @@ fn choosing_a_light_among_candidates_changes_nothing_but_noise() {
     for (k, scene) in scenes.iter().enumerate() {
         let seed = 520 + 10 * k as u64;
         let one = estimate(scene, How::new(32768, seed).depth(3).by(path("candidates=1")));
-        for (i, words) in
-            ["candidates=2", "candidates=3 lightsampler=power", "candidates=64", "lights=3 candidates=2"].iter().enumerate()
+        for (i, words) in ["candidates=2", "candidates=3 lightsampler=power", "candidates=64", "lights=3 candidates=2"]
+            .iter()
+            .enumerate()
         {
             let how = How::new(16384, seed + 1 + i as u64).depth(3).by(path(words));
             assert_agree(&one, &estimate(scene, how), 0.025, &format!("{words}, scene {k}"));

@@ -399,7 +399,20 @@ impl SharedPathIntegrator {
         }
         let direct_light = |throughput, lambda: &_, stats: &mut _| {
             let draws = stream.light(1);
-            direct_light(scene, &at, &bsdf, throughput, lambda, &draws, None, LightChoice::ONE, None, 1, stats, &mut NoRecord)
+            direct_light(
+                scene,
+                &at,
+                &bsdf,
+                throughput,
+                lambda,
+                &draws,
+                None,
+                LightChoice::ONE,
+                None,
+                1,
+                stats,
+                &mut NoRecord,
+            )
         };
         if !is_shared(&bsdf) {
             if walk.throughput.is_black() {
@@ -480,7 +493,12 @@ impl SharedPathIntegrator {
         // What lamps send this way is weighed later, when it is known who sees the surface. So they are asked for twice: with any density of
         // the direction (1), when [`Lamps`] catches what light samples find too and divides the weight out; and with none, when
         // the rest of the path brings but what they cannot find.
-        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 1.0, specular: false, light_splits: 1 });
+        walk.previous = Some(Previous {
+            reference: at.reference(),
+            bsdf_pdf: 1.0,
+            specular: false,
+            light_choice: LightChoice::ONE,
+        });
         let mut lamps = Lamps(drawn.wi, |light| incoming.push(light));
         match walk.met {
             None => _ = path.escaped(scene, &walk, lambda, &mut lamps),
@@ -491,7 +509,12 @@ impl SharedPathIntegrator {
                 }
             }
         }
-        walk.previous = Some(Previous { reference: at.reference(), bsdf_pdf: 0.0, specular: false, light_splits: 1 });
+        walk.previous = Some(Previous {
+            reference: at.reference(),
+            bsdf_pdf: 0.0,
+            specular: false,
+            light_choice: LightChoice::ONE,
+        });
         let radiance = go_on(path, scene, member, &mut walk, lambda, stats, &mut NoRecord);
         incoming.push(Incoming { wi: drawn.wi, radiance, light_pdf: 0.0, found_by_bsdf: true });
     }

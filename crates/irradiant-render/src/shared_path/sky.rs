@@ -12,7 +12,6 @@
 
 use super::{PIXELS, Scratch};
 use crate::integrator::RenderStats;
-use crate::light_samples::samples_of;
 use crate::path::PathIntegrator;
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::interaction::{LightId, ReferencePoint};
@@ -43,7 +42,7 @@ impl<'a> SharedSky<'a> {
     pub fn of(scene: &'a Scene, path: &PathIntegrator, tests: u32) -> Option<Self> {
         let (id, sky) = scene.lights.only_sky().filter(|_| tests > 0)?;
         let anywhere = ReferencePoint { p: Point3::ZERO, p_error: Vec3::ZERO, n: Normal3::ZERO, ns: Normal3::ZERO };
-        Some(Self { id, sky, times: samples_of(scene, &anywhere, id, path.light_choice_at(scene, 0).splits), tests })
+        Some(Self { id, sky, times: path.light_choice_at(scene, 0).tests_of(scene, &anywhere, id), tests })
     }
 
     /// What a light sample counts for that stands for a `share` of all and was picked with the chance `pmf`.

@@ -123,8 +123,8 @@ pub(crate) struct Batch {
     pub(super) previous: [Triples; 4],
     pub(super) bsdf_pdf: Floats,
     pub(super) specular: [bool; LANES],
-    /// Strata of the choice of a light at the last vertex, the same for all.
-    pub(super) light_splits: u32,
+    /// How lights were sampled at the last vertex, the same for all.
+    pub(super) light_choice: LightChoice,
     pub(super) throughput: SpectrumLanes,
     pub(super) roulette_scale: Floats,
     pub(super) met: [Option<Hit>; LANES],
@@ -234,7 +234,7 @@ impl Batch {
             previous: [Triples::ZERO; 4],
             bsdf_pdf: [0.0; LANES],
             specular: [false; LANES],
-            light_splits: 1,
+            light_choice: LightChoice::ONE,
             throughput: SpectrumLanes::ZERO,
             roulette_scale: [0.0; LANES],
             met: [None; LANES],
@@ -354,7 +354,7 @@ impl Batch {
                 reference,
                 bsdf_pdf: self.bsdf_pdf[i],
                 specular: self.specular[i],
-                light_splits: self.light_splits,
+                light_choice: self.light_choice,
             }
         });
         Walk {

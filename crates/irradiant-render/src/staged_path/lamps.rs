@@ -4,7 +4,7 @@ use super::batch::{Batch, MetLamp};
 use super::kernels::{SampleRectangles, SampleSky, SampleSpheres, Weigh};
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
-use crate::light_samples::{LightChoice, all_are_sampled, samples_by_chance, strata};
+use crate::light_samples::{LightChoice, all_are_sampled, strata};
 use crate::path::power_heuristic;
 use irradiant_core::bxdf::TransportMode;
 use irradiant_core::geometry::EmitterShape;
@@ -76,7 +76,7 @@ impl Batch {
     pub fn light_of_lamps(&mut self, depth: u32, scene: &Scene, radiance: &mut [SampledSpectrum]) {
         // Whose weight is asked for: not what the camera sees, by itself or in mirrors, nor where all lights are sampled.
         self.seeking.clear();
-        let all_are_sampled = all_are_sampled(scene, self.light_splits);
+        let all_are_sampled = all_are_sampled(scene, self.light_choice.splits);
         for met in self.lamps_met.iter().filter(|met| depth > 0 && !self.specular[met.lane as usize]) {
             (self.picked[met.lane as usize], self.pmf[met.lane as usize]) = (met.light.0, 1.0);
             if !all_are_sampled {
@@ -98,7 +98,7 @@ impl Batch {
                 if !self.specular[i] {
                     let hit = LightHit { p: self.at.p.point(i), n: self.at.n.normal(i), uv: met.uv };
                     let pdf = scene.lights.get(met.light).pdf_hit(&from.reference(i), self.d.vector(i), &hit);
-                    light_pdf = samples_by_chance(self.pmf[i], self.light_splits) * pdf;
+                    light_pdf = self.light_choice.tests_by_chance(self.pmf[i]) * pdf;
                 }
             }
             let weight = if light_pdf > 0.0 { power_heuristic(bsdf_pdf, light_pdf) } else { 1.0 };

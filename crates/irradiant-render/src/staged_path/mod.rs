@@ -39,9 +39,7 @@ const AHEAD: usize = 8;
 impl PathIntegrator {
     /// Whether this scene's paths may go in batches.
     pub(crate) fn has_stages(&self, scene: &Scene) -> bool {
-        !self.regularize
-            && scene.layers.channels() == 0
-            && StreamLanes::can_hold(&scene.sampler.stream([0, 0], 0))
+        !self.regularize && scene.layers.channels() == 0 && StreamLanes::can_hold(&scene.sampler.stream([0, 0], 0))
     }
 
     /// What the camera rays of some samples see, whose first hits are known: into `radiance`, all zero before.
@@ -253,7 +251,7 @@ impl PathIntegrator {
         stats.longest_path = stats.longest_path.max(if directions > 0 { depth } else { 0 });
         let n = b.leave(n, scene);
         stats.bounce_rays += n as u64;
-        b.light_splits = self.light_choice_at(scene, depth - 1).splits;
+        b.light_choice = self.light_choice_at(scene, depth - 1);
         if self.is_at_limit(depth) && only_the_sky_counts(scene) {
             return those_that_escape(b, n, scene);
         }

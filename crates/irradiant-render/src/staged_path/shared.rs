@@ -192,7 +192,7 @@ impl PathIntegrator {
             Some((throughput, scale))
         });
         let n = b.leave(n, scene);
-        b.light_splits = self.light_choice_at(scene, 0).splits;
+        b.light_choice = self.light_choice_at(scene, 0);
         scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         match sky {
             Some(sky) => b.look_at_sky(n, sky, blocks),
@@ -321,7 +321,7 @@ impl PathIntegrator {
             Some((throughput, scale))
         });
         let n = b.leave(n, scene);
-        b.light_splits = 1;
+        b.light_choice = LightChoice::ONE;
         scene.geometry.intersect_rays(&mut b.rays, true, &scene.alpha(), &mut b.met[..n]);
         for i in 0..n {
             let s = b.sample[i] as usize;

@@ -4,7 +4,7 @@ use super::batch::{Batch, SpectrumLanes};
 use super::kernels::Choose;
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
-use crate::light_samples::{LightChoice, Reservoir, all_are_sampled, samples_by_chance};
+use crate::light_samples::{LightChoice, Reservoir, all_are_sampled};
 use irradiant_core::interaction::LightId;
 use irradiant_core::light::TargetLanes;
 use irradiant_core::light_sampler::{PickedLight, PointLanes};
@@ -71,12 +71,13 @@ impl Batch {
     pub(super) fn split_light_samples(
         &mut self,
         n: usize,
-        LightChoice { splits, is_resampled }: LightChoice,
+        choice: LightChoice,
         scene: &Scene,
         samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
+        let LightChoice { splits, is_resampled } = choice;
         // A path's are added to each other first, since sums depend on the order.
         let mut sums = [SampledSpectrum::ZERO; LANES];
         let sums = &mut sums[..radiance.len()];
@@ -98,7 +99,7 @@ impl Batch {
             let seeking = std::mem::take(&mut self.seeking);
             for light in 0..scene.lights.len() as u32 {
                 for &i in &seeking {
-                    self.pick(i as usize, PickedLight { id: LightId(light), pmf: 1.0 }, 1.0, splits);
+                    self.pick(i as usize, PickedLight { id: LightId(light), pmf: 1.0 }, 1.0, choice);
                 }
                 candidates(self);
             }
@@ -111,7 +112,7 @@ impl Batch {
                     self.pmf[i] = 0.0;
                     if k < self.light_counts[i] {
                         let (picked, times) = self.light_picks[i * splits as usize + k as usize];
-                        self.pick(i, picked, times as f32 / splits as f32, splits);
+                        self.pick(i, picked, times as f32 / splits as f32, choice);
                     }
                 }
                 candidates(self);
@@ -129,9 +130,9 @@ impl Batch {
 
     /// Puts a light into a lane that stands for a share of the strata.
     #[inline(always)]
-    fn pick(&mut self, i: usize, picked: PickedLight, share: f32, splits: u32) {
+    fn pick(&mut self, i: usize, picked: PickedLight, share: f32, choice: LightChoice) {
         (self.picked[i], self.pmf[i]) = (picked.id.0, picked.pmf);
-        (self.light_times[i], self.light_share[i]) = (samples_by_chance(picked.pmf, splits), share);
+        (self.light_times[i], self.light_share[i]) = (choice.tests_by_chance(picked.pmf), share);
     }
 
     /// The lights that the strata of each path that seeks light pick, as [`PickedLights`](crate::light_samples::PickedLights) has them.
