@@ -69,7 +69,7 @@ fn picture_tables(reports: &[Report]) -> String {
             box filter, equal depth. Error x time: lower is better. Goal: at most 0.5 x the best peer's, for 1,000 lamps at most 0.1 x Mitsuba's; \
             paths per CPU second at least Mitsuba's, which takes one light sample at each surface, as ours do with `candidates=1`; by itself `path` chooses \
             among several at the first two.\n\n";
-    out += "| scene | `path`, rgb | `sharedpath`, rgb | `path`, spectral | best peer | `path` / best | `sharedpath` / best | goal | by `path` | by `sharedpath` | paths per CPU s, one light sample a surface as Mitsuba llvm / that | by `path` / that |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+    out += "| scene | `path`, rgb | `sharedpath`, rgb | `path`, spectral | best peer | `path` / best | `sharedpath` / best | goal | by `path` | by `sharedpath` | paths per CPU s, of Mitsuba llvm's: `candidates=1` | the same: `path` |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     for r in reports {
         let find = |name: &str| r.entries.iter().find(|e| e.name == name);
         let [rgb, shared, spectral] =

@@ -40,7 +40,7 @@ pub(crate) fn check_splits(name: &str, splits: u32) -> Result<(), String> {
 pub(crate) struct LightChoice {
     /// Strata of the choice of a light, [`MOST_SPLITS`] at most.
     pub splits: u32,
-    /// Whether the lights that these pick are candidates, of which one is tested.
+    /// Whether the lights that these pick are candidates, of which one is tested; only where there are several of both.
     pub is_resampled: bool,
 }
 
@@ -161,6 +161,7 @@ fn split_light<R: PathRecorder>(
     stats: &mut RenderStats,
     recorder: &mut R,
 ) -> SampledSpectrum {
+    // What all bring, or the one that is chosen.
     let mut sum = SampledSpectrum::ZERO;
     let (mut chosen, mut reservoir) = (None, Reservoir::new(draws.resample));
     for (picked, share) in PickedLights::of(scene, &at.reference(), draws, choice.splits).iter() {
@@ -176,10 +177,10 @@ fn split_light<R: PathRecorder>(
             }
         }
     }
-    match chosen {
-        Some(chosen) => chosen.unless_blocked(scene, at, reservoir.stands_for(), depth, stats, recorder),
-        None => sum,
+    if let Some(chosen) = chosen {
+        sum = chosen.unless_blocked(scene, at, reservoir.stands_for(), depth, stats, recorder);
     }
+    sum
 }
 
 /// Of weights that come one after another, keeps one by chance, in proportion (one number serves for all: what is left of it after a decision
@@ -200,7 +201,7 @@ impl Reservoir {
         Self { number, total: 0.0, kept: 0.0 }
     }
 
-    /// Adds a weight. Whether it is kept from now on. What is not a number is, so that it is seen.
+    /// Adds a weight. Whether it is kept from now on. What is not a number is taken, and what comes after it, and neither stands for a number.
     #[inline(always)]
     pub fn takes(&mut self, weight: f32) -> bool {
         let total = self.total + weight;
@@ -335,7 +336,7 @@ impl Brought {
     ) -> SampledSpectrum {
         let Self { light, sample, radiance, mis_weight, light_pdf, bsdf_pdf } = self;
         stats.shadow_rays += 1;
-        recorder.light_tested(depth, light, times);
+        recorder.light_tested(depth, light);
         if scene.is_occluded(at, &sample) {
             return SampledSpectrum::ZERO;
         }

@@ -37,8 +37,8 @@ pub struct PathIntegrator {
     pub roulette: Roulette,
     /// Strata of the choice of a light at the first surface, 1 to 64: each light that is picked is tested.
     pub light_splits: u32,
-    /// Lights of which one is tested at the first two surfaces, where nothing else is said, 1 to 64; all where there are no more than four times
-    /// as many.
+    /// Light samples of which one is tested at the first two surfaces, unless `light_splits` says otherwise, 1 to 64: so many that are picked, or each
+    /// light in turn if there are no more than four times as many, nor than 64.
     pub light_candidates: u32,
 }
 
@@ -150,7 +150,7 @@ pub(crate) const fn lights_option(default: u32) -> OptionEntry {
 /// Of how many lights, picked by the light sampler, one is tested. (Figures: decision 8.)
 const CANDIDATES: u32 = 2;
 
-/// As long as taking each of so many times as many lights in turn costs as much as picking them.
+/// Lights are taken in turn instead if there are no more than so many times as many: a turn spares the walk through the tree.
 const TURNS_PER_PICK: usize = 4;
 
 /// So many surfaces choose among candidates; what others gain is not worth the time.
@@ -161,7 +161,7 @@ const CANDIDATES_OPTION: OptionEntry = OptionEntry {
     name: "candidates",
     range: OptionRange::Count(1, MOST_SPLITS),
     default: Value::Count(CANDIDATES),
-    doc: "lights of which one is tested by a ray at the first two surfaces, drawn in proportion to what each would bring if nothing stood in the way (A59): so many that are picked, or all lights if these are at most four times as many; 1: no choice. At the first surface `lights` goes before, if above 1",
+    doc: "lights of which one is tested by a ray at the first two surfaces, drawn in proportion to what each would bring if nothing stood in the way (A59): so many that are picked, or each light in turn if there are at most four times as many as candidates, and at most 64; 1: no choice. At the first surface `lights` goes before, if above 1",
 };
 
 /// By name.

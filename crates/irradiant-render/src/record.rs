@@ -67,8 +67,8 @@ pub trait PathRecorder {
     fn vertex(&mut self, _depth: u32, _at: &Interaction, _bsdf: &Bsdf) {}
     /// The path leaves the scene.
     fn escape(&mut self, _depth: u32, _direction: Vec3) {}
-    /// A light sample is tested by a ray, which stands for so many of its kind (1 over its chance, where it was chosen among candidates).
-    fn light_tested(&mut self, _depth: u32, _light: LightId, _stands_for: f32) {}
+    /// A light sample is tested by a ray, at the vertex after so many scattering events.
+    fn light_tested(&mut self, _depth: u32, _light: LightId) {}
     /// Light is found.
     fn contribution(&mut self, _c: &Contribution) {}
     /// The path goes on.

@@ -184,6 +184,14 @@ impl Context<'_> {
         }
     }
 
+    /// The same, each surface asking the one light that the light sampler picks.
+    pub fn production_of_one_light(&self, max_depth: Option<u32>) -> Box<dyn Estimator> {
+        match self.wrong() {
+            Wrong::Nothing => Box::new(Production { max_depth, one_light: true, ..Production::default() }),
+            _ => self.production(max_depth),
+        }
+    }
+
     /// Reads a scene, and leaves it in the lesson's folder under `name` for whoever wants to render it.
     pub fn file(&self, name: &str, text: &str) -> Result<SceneFile, Error> {
         if let Some(at) = self.lesson.running[self.index].lock().unwrap_or_else(|e| e.into_inner()).as_mut() {

@@ -54,6 +54,8 @@ pub struct Production {
     pub max_depth: Option<u32>,
     /// When paths end by chance.
     pub roulette: Roulette,
+    /// Whether each surface asks one light, which the light sampler picks, and does not choose among candidates.
+    pub one_light: bool,
 }
 
 impl Production {
@@ -98,7 +100,11 @@ impl Estimator for Production {
         stats: &mut RenderStats,
         tell: &mut dyn FnMut(&Part),
     ) -> SampledSpectrum {
-        let integrator = PathIntegrator { max_depth: self.max_depth, roulette: self.roulette, ..Default::default() };
+        let mut integrator =
+            PathIntegrator { max_depth: self.max_depth, roulette: self.roulette, ..Default::default() };
+        if self.one_light {
+            integrator.light_candidates = 1;
+        }
         let mut telling = Telling { tell, lobes: Vec::new() };
         integrator.radiance(scene, camera_ray, stream, lambda, &mut [], stats, &mut telling)
     }

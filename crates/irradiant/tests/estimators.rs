@@ -159,12 +159,12 @@ fn splitting_the_choice_of_a_light_changes_nothing_but_noise() {
     let scene = lamps_over_metal("");
     let one = estimate(&scene, How::new(32768, 501).depth(2).by(path("candidates=1")));
     for (i, words) in [
-        "lights=2",
-        "lights=3",
-        "lights=8",
-        "lights=64",
-        "lights=5 lightsampler=power",
-        "lights=4 lightsampler=uniform",
+        "lights=2 candidates=1",
+        "lights=3 candidates=1",
+        "lights=8 candidates=1",
+        "lights=64 candidates=1",
+        "lights=5 candidates=1 lightsampler=power",
+        "lights=4 candidates=1 lightsampler=uniform",
     ]
     .into_iter()
     .enumerate()

@@ -7,6 +7,7 @@ use irradiant::renderer::inspect::light_claims::{light_density_integral, off_lig
 use irradiant::renderer::inspect::{
     AuditSettings, IncidentSettings, PathStory, audit, dimensions, incident, replay, residuals,
 };
+use irradiant::renderer::inspect::story::LightOutcome;
 use irradiant::renderer::path::PathIntegrator;
 use irradiant::renderer::record::PathEnd;
 use irradiant::{IntegratorChoice, Job, RenderSettings, load_text};
@@ -108,6 +109,39 @@ fn the_books_hold_where_the_choice_of_a_light_is_split() {
         }
         // By power the sky is picked nearly always.
         assert!(found > 800 && several > if words.contains("power") { 5 } else { 200 }, "{words}: {found} {several}");
+    }
+}
+
+/// The same where the first two surfaces choose one of several candidates: of all lights, and of some that are picked.
+#[test]
+fn the_books_hold_where_lights_are_chosen_among_candidates() {
+    let lamps: String = (0..12)
+        .map(|i| {
+            let x = 0.15 * i as f32 - 0.9;
+            format!("AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ {i} 4 2 ]\nTranslate {x} 0.4 0.3\nShape \"sphere\" \"float radius\" 0.05\nAttributeEnd\n")
+        })
+        .collect();
+    for (text, candidates) in [(ROOM.to_string(), 2), (ROOM.to_string() + &lamps, 3)] {
+        let choice = IntegratorChoice::named("path").and_then(|c| c.with_words(&format!("candidates={candidates}")));
+        let settings = RenderSettings { integrator: Some(choice.expect("an option")), ..RenderSettings::default() };
+        let (job, integrator) = job_with(&text, &settings);
+        let (mut found, mut passed_over, mut lit) = (0, 0, 0);
+        for story in all_stories(&job, &integrator, 2) {
+            for f in &story.found {
+                assert!(
+                    f.account.expect("no interfaces here").difference() < 1e-4,
+                    "{candidates} {:?} {f:?}",
+                    story.pixel
+                );
+                found += 1;
+            }
+            for vertex in &story.vertices {
+                let count = |outcome| vertex.lights.iter().filter(|l| l.outcome == outcome).count();
+                assert!(count(LightOutcome::Lit) + count(LightOutcome::Blocked) <= 1, "{vertex:?}");
+                (passed_over, lit) = (passed_over + count(LightOutcome::PassedOver), lit + count(LightOutcome::Lit));
+            }
+        }
+        assert!(found > 800 && passed_over > 300 && lit > 500, "{candidates}: {found} {passed_over} {lit}");
     }
 }
 

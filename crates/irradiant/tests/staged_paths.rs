@@ -83,8 +83,12 @@ fn lamps_of_all_kinds() -> String {
         "AttributeBegin\nAreaLightSource \"diffuse\" \"rgb L\" [ 5 1 5 ]\nShape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ -.9 .5 0  -.9 1 0  -.9 1 .5 ]\nAttributeEnd\n".into(),
         "LightSource \"point\" \"rgb I\" [ .3 .2 .2 ] \"point3 from\" [ 0 1 -.5 ]\n".into(),
     ];
-    format!("{HEAD}{ROOM}{}", lamps.concat())
+    // Surfaces that are asked alone, too.
+    format!("{HEAD}{ROOM}{COATS}{}", lamps.concat())
 }
+
+/// A coated table, and a ball of rough glass on it.
+const COATS: &str = "AttributeBegin\nMaterial \"coateddiffuse\" \"rgb reflectance\" [ .2 .3 .7 ] \"float roughness\" .1\nTranslate .3 .4 0\nRotate 90 1 0 0\nShape \"disk\" \"float radius\" 0.5\nMaterial \"dielectric\" \"float roughness\" .2\nTranslate .1 0 -.25\nShape \"sphere\" \"float radius\" 0.2\nAttributeEnd\n";
 
 #[test]
 fn one_of_many_lamps() {
@@ -149,7 +153,7 @@ fn hundreds_of_lamps() {
             }
         })
         .collect();
-    let text = format!("{HEAD}{ROOM}{}{lamps}", plate(0.1));
+    let text = format!("{HEAD}{ROOM}{COATS}{}{lamps}", plate(0.1));
     for light_candidates in [1, 2, 5] {
         assert_same_by(&PathIntegrator { light_candidates, ..PathIntegrator::default() }, &text);
     }
@@ -183,6 +187,9 @@ fn under_an_image_of_the_sky() {
         ceiling_lamp(),
         plate(0.05)
     ));
+    // A dozen lamps beside it, of which some are picked.
+    let lamps: String = (0..12).map(|i| lamp("\"rgb L\" [ 3 3 2 ]", 0.15 * i as f32 - 0.9, 1.9, 0.2, 0.05)).collect();
+    assert_same(&format!("{HEAD}{sky}{ROOM}{}{lamps}{smooth}", plate(0.1)));
     // Where no surface shines, the last rays need not know what they meet.
     for depth in 1..4 {
         let text = format!("{HEAD}{sky}{ROOM}{}{smooth}", plate(0.2));
@@ -208,6 +215,18 @@ fn lights_that_no_ray_meets_through_surfaces_that_may_not_be_there() {
     let text = format!("{HEAD}{lights}{ROOM}{}{veil}{}", plate(0.2), ceiling_lamp());
     for (light_splits, light_candidates) in [(1, 1), (1, 2), (3, 2), (8, 1)] {
         assert_same_by(&PathIntegrator { light_splits, light_candidates, ..PathIntegrator::default() }, &text);
+    }
+    // So many that some are picked, where strata may pick nothing.
+    let many: String = (0..12)
+        .map(|i| {
+            format!(
+                "LightSource \"spot\" \"rgb I\" [ 5 {i} 2 ] \"point3 from\" [ 0 1.2 .1 ] \"point3 to\" [ .3 0 -.{i} ]\n"
+            )
+        })
+        .collect();
+    for light_candidates in [2, 3] {
+        let text = text.replace("WorldBegin\n", &format!("WorldBegin\n{many}"));
+        assert_same_by(&PathIntegrator { light_candidates, ..PathIntegrator::default() }, &text);
     }
 }
 

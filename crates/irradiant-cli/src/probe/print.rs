@@ -66,7 +66,10 @@ fn one(job: &Job, story: &PathStory, bounces: Option<&RangeInclusive<u32>>) {
                 LightOutcome::Blocked => println!("light        sample of light {}: blocked", tried.light.0),
                 LightOutcome::Black => println!("light        sample of light {}: nothing from there", tried.light.0),
                 LightOutcome::PassedOver => {
-                    println!("light        sample of light {}: a candidate, another one was tested", tried.light.0);
+                    println!(
+                        "light        sample of light {}: passed over, another candidate was tested",
+                        tried.light.0
+                    );
                 }
             }
         }

@@ -61,7 +61,7 @@ impl RayBatch {
         self.blocked[ray]
     }
 
-    /// Says so of a ray, by another's knowledge.
+    /// Says whether anything is in the way of a ray, where that is known better.
     pub fn set_blocked(&mut self, ray: usize, is_blocked: bool) {
         self.blocked[ray] = is_blocked;
     }

@@ -269,14 +269,22 @@ impl RadianceImage {
         }
     }
 
-    /// Asks for the memory of `count` pixels of row `y` from column `x` on, at most two cache lines.
+    /// Asks for the memory of `count` pixels of row `y` from column `x` on, at most three cache lines.
     #[inline(always)]
     pub(super) fn prefetch_run(&self, x: usize, y: usize, count: usize) {
         let end = self.width * self.height - 1;
-        for place in [y * self.width + x, y * self.width + x + count - 1].map(|place| place.min(end)) {
-            match &self.pixels {
-                Pixels::Half(pixels) => irradiant_bvh::prefetch_read(&pixels[place]),
-                Pixels::Single(pixels) => irradiant_bvh::prefetch_read(&pixels[place]),
+        let (first, middle, last) =
+            (y * self.width + x, y * self.width + x + count / 2, y * self.width + x + count - 1);
+        let places = [first.min(end), middle.min(end), last.min(end)];
+        match &self.pixels {
+            Pixels::Half(pixels) => {
+                irradiant_bvh::prefetch_read(&pixels[places[0]]);
+                irradiant_bvh::prefetch_read(&pixels[places[2]]);
+            }
+            Pixels::Single(pixels) => {
+                for place in places {
+                    irradiant_bvh::prefetch_read(&pixels[place]);
+                }
             }
         }
     }

@@ -64,7 +64,7 @@ impl TargetLanes {
         }
     }
 
-    /// If so, takes the ray of a lane that has been aimed.
+    /// Takes the ray of a lane that has been aimed from another, if it `is_taken`.
     #[inline(always)]
     pub fn keep(&mut self, i: usize, from: &Self, is_taken: bool) {
         let choose = |a: f32, b: f32| if is_taken { a } else { b };

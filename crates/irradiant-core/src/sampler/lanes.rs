@@ -68,7 +68,7 @@ impl StreamLanes {
         self.block(n, 1, [false, false], out);
     }
 
-    /// As [`SampleStream::light`], of `n` lanes: where on the light, perhaps which, perhaps one to spare.
+    /// As [`SampleStream::light`], of `n` lanes: where on the light, perhaps which, perhaps one for resampling.
     #[inline(always)]
     pub fn light(&self, n: usize, depth: u32, pick: bool, resample: bool, out: &mut BlockLanes) {
         self.block(n, CAMERA_BLOCKS + depth * BLOCKS_PER_VERTEX, [pick, resample], out);

@@ -7,7 +7,7 @@
 
 use crate::camera_samples::camera_sample;
 use crate::integrator::RenderStats;
-use crate::light_samples::PickedLights;
+use crate::light_samples::{LightChoice, PickedLights};
 use crate::path::PathIntegrator;
 use crate::record::{Contribution, PathEnd, PathRecorder, Scattering, Technique};
 use irradiant_core::bsdf::Bsdf;
@@ -15,6 +15,7 @@ use irradiant_core::bxdf::{Sides, TransportMode};
 use irradiant_core::camera::CameraRay;
 use irradiant_core::interaction::{Interaction, LightId};
 use irradiant_core::light::{LightTarget, SampleMode};
+use irradiant_core::light_sampler::PickedLight;
 use irradiant_core::sampler::SampleStream;
 use irradiant_core::scene::Scene;
 use irradiant_math::{Point3, Ray, Vec3};
@@ -38,7 +39,7 @@ pub enum LightOutcome {
     Blocked,
     /// The light does not shine here, or the surface does not scatter it.
     Black,
-    /// Another candidate was tested in its place.
+    /// It was a candidate, and another one was tested.
     PassedOver,
 }
 
@@ -194,17 +195,10 @@ struct Recorder {
     vertices: Vec<Interaction>,
     scatterings: Vec<Scattering>,
     contributions: Vec<Contribution>,
-    tested: Vec<Tested>,
+    /// Lights whose samples were tested by a ray, with the vertex.
+    tested: Vec<(u32, LightId)>,
     escape: Option<Vec3>,
     end: Option<PathEnd>,
-}
-
-/// A light sample that was tested.
-#[derive(Clone, Copy, Debug)]
-struct Tested {
-    depth: u32,
-    light: LightId,
-    stands_for: f32,
 }
 
 impl PathRecorder for Recorder {
@@ -216,8 +210,8 @@ impl PathRecorder for Recorder {
         self.escape = Some(direction);
     }
 
-    fn light_tested(&mut self, depth: u32, light: LightId, stands_for: f32) {
-        self.tested.push(Tested { depth, light, stands_for });
+    fn light_tested(&mut self, depth: u32, light: LightId) {
+        self.tested.push((depth, light));
     }
 
     fn contribution(&mut self, c: &Contribution) {
@@ -231,6 +225,19 @@ impl PathRecorder for Recorder {
     fn end(&mut self, why: PathEnd) {
         self.end = Some(why);
     }
+}
+
+/// A light sample, drawn again.
+struct Asked {
+    light: LightId,
+    to: LightEnd,
+    /// f |cos|, by wavelength.
+    f_cos: [f64; 4],
+    arriving: SampledSpectrum,
+    /// With which it was drawn, shares of strata included.
+    density: f64,
+    /// What it would bring if nothing were in the way, but for a factor of all at the vertex.
+    expected: f64,
 }
 
 /// Multiplies values and densities apart from each other.
@@ -272,13 +279,27 @@ impl Bookkeeper<'_> {
             if asks {
                 let choice = integrator.light_choice_at(scene, depth);
                 let picked = PickedLights::of(scene, &at.reference(), &self.stream.light(depth), choice.splits);
-                for (light, share) in picked.iter() {
-                    let c = found(Technique::LightSample, depth + 1).find(|c| c.light == light.id);
-                    let tested = recorder.tested.iter().find(|t| t.depth == depth && t.light == light.id);
-                    let stands_for = tested.map_or(1.0, |t| t.stands_for);
-                    let pmf = f64::from(light.pmf) / (f64::from(share) * f64::from(stands_for));
-                    let tried = self.light(&at, &bsdf, &lambda, depth, light.id, pmf, tested.is_some(), c, story);
-                    story.vertices[depth as usize].lights.extend(tried);
+                let asked = picked
+                    .iter()
+                    .filter_map(|(light, share)| self.ask(&at, &bsdf, &lambda, depth, light, share, choice));
+                let asked: Vec<Asked> = asked.collect();
+                let total: f64 = asked.iter().map(|asked| asked.expected).sum();
+                let is_tested = |light| recorder.tested.contains(&(depth, light));
+                let any_is_tested = asked.iter().any(|asked| is_tested(asked.light));
+                for asked in asked {
+                    let outcome = match found(Technique::LightSample, depth + 1).find(|c| c.light == asked.light) {
+                        Some(c) => {
+                            let chance = if choice.is_resampled { asked.expected / total } else { 1.0 };
+                            let account = Some(self.account(c, asked.arriving, asked.f_cos, asked.density * chance));
+                            story.found.push(Found { contribution: *c, from: depth + 1, to: asked.to, account });
+                            LightOutcome::Lit
+                        }
+                        None if !(asked.expected > 0.0) => LightOutcome::Black,
+                        None if any_is_tested && !is_tested(asked.light) => LightOutcome::PassedOver,
+                        None => LightOutcome::Blocked,
+                    };
+                    let tried = LightTry { light: asked.light, to: asked.to, outcome };
+                    story.vertices[depth as usize].lights.push(tried);
                 }
             }
             if let Some(s) = scattering {
@@ -310,42 +331,34 @@ impl Bookkeeper<'_> {
         Account { value, density, density_in_weight }
     }
 
-    /// Asks a light of the vertex again, which stands for 1/`pmf` lights if it was tested.
-    fn light(
+    /// Asks a light of the vertex again that stands for a `share` of those that were picked.
+    fn ask(
         &self,
         at: &Interaction,
         bsdf: &Bsdf,
         lambda: &Wavelengths,
         depth: u32,
-        id: LightId,
-        pmf: f64,
-        tested: bool,
-        found: Option<&Contribution>,
-        story: &mut PathStory,
-    ) -> Option<LightTry> {
+        PickedLight { id: light, pmf }: PickedLight,
+        share: f32,
+        choice: LightChoice,
+    ) -> Option<Asked> {
         let scene = self.scene;
         let draws = self.stream.light(depth);
-        let light = scene.lights.get(id);
-        let sample = light.sample(&at.reference(), draws.uv, lambda, SampleMode::Compensated)?;
-        let f = bsdf.f(at.wo, sample.wi, TransportMode::Radiance) * bsdf.abs_cos(sample.wi);
+        let sample = scene.lights.get(light).sample(&at.reference(), draws.uv, lambda, SampleMode::Compensated)?;
+        let (f, bsdf_pdf) = bsdf.f_and_pdf(at.wo, sample.wi, TransportMode::Radiance);
+        let cos = f64::from(bsdf.abs_cos(sample.wi));
+        let f_cos: [f64; 4] = std::array::from_fn(|i| f64::from(f[i]) * cos);
         let arriving = sample.radiance * scene.opacity(&sample);
         let to = match sample.target {
             LightTarget::Point(p) | LightTarget::Surface { p, .. } => LightEnd::Point(p),
             LightTarget::Infinite => LightEnd::Direction(sample.wi),
         };
-        let outcome = match found {
-            Some(c) => {
-                let f_cos = std::array::from_fn(|i| f64::from(f[i]));
-                let pdf = pmf * f64::from(sample.pdf);
-                let account = Some(self.account(c, arriving, f_cos, pdf));
-                story.found.push(Found { contribution: *c, from: depth + 1, to, account });
-                LightOutcome::Lit
-            }
-            None if f.is_black() || arriving.is_black() => LightOutcome::Black,
-            None if tested => LightOutcome::Blocked,
-            None => LightOutcome::PassedOver,
-        };
-        Some(LightTry { light: id, to, outcome })
+        let density = f64::from(pmf) / f64::from(share) * f64::from(sample.pdf);
+        let light_pdf = f64::from(choice.tests_by_chance(pmf)) * f64::from(sample.pdf);
+        let found_by_bsdf = f64::from(bsdf_pdf).powi(2) / light_pdf.powi(2);
+        let weight = if sample.is_delta { 1.0 } else { 1.0 / (1.0 + found_by_bsdf) };
+        let brought = (0..4).map(|i| self.value[i] * f_cos[i] * f64::from(arriving[i])).sum::<f64>();
+        Some(Asked { light, to, f_cos, arriving, density, expected: brought * weight / density })
     }
 
     /// Draws the direction again and goes on.

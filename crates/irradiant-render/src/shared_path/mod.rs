@@ -15,7 +15,7 @@
 //!
 //! What is shared: second vertices on diffuse surfaces, leaves and rough metals, for first vertices on the same; and, for these too, the sky, if it is the only
 //! environment and has no portal ([`sky`]). All else (direct light of lamps at the first vertex, lamps that the path meets, other materials) is each pixel's own, as
-//! in [`path`](crate::path).
+//! in [`path`](crate::path) with one candidate.
 //!
 //! Errors of the pixels of a block go together: a picture has less noise per pixel but what is left is blotchy, and the mean over
 //! many pixels has the error that [`path`](crate::path) would give it. All of a block share the time; each path has wavelengths of its

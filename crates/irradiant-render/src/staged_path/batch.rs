@@ -4,7 +4,7 @@ use super::kernels::{Numbers, PlacesOfBounces, PlacesOfCamera, Scatter};
 use super::lamps::{PlainLamp, has_one_light};
 use super::split::ChosenLanes;
 use crate::camera_samples::{BatchSample, Beginnings};
-use crate::light_samples::{LightChoice, strata};
+use crate::light_samples::LightChoice;
 use crate::path::{Previous, Walk, power_heuristic};
 use irradiant_core::bsdf::Bsdf;
 use irradiant_core::bxdf::{Bxdf, Conductor, Diffuse, Ggx, Sides, TransportMode};
@@ -186,7 +186,7 @@ pub(crate) struct Batch {
     /// How often the light is sampled at the vertex on average, and the share of all samples that this one stands for.
     pub(super) light_times: Floats,
     pub(super) light_share: Floats,
-    /// What the light brings to the sample, but for what is in the way, and whether it is to be counted: of diffuse surfaces and metals.
+    /// What the light brings to the sample, but for what is in the way, and whether it is to be counted.
     pub(super) brought: SpectrumLanes,
     pub(super) brings: [u32; LANES],
     /// Paths whose light samples are drawn alone.
@@ -539,7 +539,7 @@ impl Batch {
     /// Draws the numbers of vertices that are known, those for roulette only where it is played.
     pub fn draw(&mut self, n: usize, depth: u32, scene: &Scene, choice: LightChoice, roulette: bool) {
         let (pick, lobe) = (!has_one_light(scene), !self.bsdfs.is_empty());
-        let resample = choice.is_resampled && strata(scene, choice.splits) > 1;
+        let resample = choice.is_resampled;
         scene.geometry.level().run(Numbers { batch: self, n, depth, pick, resample, lobe, roulette });
     }
 

@@ -304,27 +304,30 @@ impl Batch {
         stats: &mut RenderStats,
     ) {
         self.bring_alone();
-        let asking = self.ask(n, Self::counts);
-        self.test_light(asking, Whose::Drawn, scene, samples, stats);
-        for (k, &i) in self.asking[..asking].iter().enumerate() {
-            let (light, s) = (self.brought.at(i as usize), self.sample[i as usize] as usize);
-            radiance[s] += if self.rays.is_blocked(k) { SampledSpectrum::ZERO } else { light };
-        }
+        self.test_light(n, Whose::Drawn, scene, samples, radiance, stats);
     }
 
-    /// What the light samples bring that were chosen, unless something is in the way.
-    pub(super) fn chosen_light(
+    /// Adds what light samples bring that have been weighed, unless something is in the way.
+    pub(super) fn test_light(
         &mut self,
         n: usize,
+        whose: Whose,
         scene: &Scene,
         samples: &[BatchSample],
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        let asking = self.ask(n, |b, i| b.chosen.has_one(i));
-        self.test_light(asking, Whose::Chosen, scene, samples, stats);
+        let asking = match whose {
+            Whose::Drawn => self.ask(n, Self::counts),
+            Whose::Chosen => self.ask(n, |b, i| b.chosen.has_one(i)),
+        };
+        self.look_for_obstacles(asking, whose, scene, samples, stats);
         for (k, &i) in self.asking[..asking].iter().enumerate() {
-            let (light, s) = (self.chosen.light(i as usize), self.sample[i as usize] as usize);
+            let (i, s) = (i as usize, self.sample[i as usize] as usize);
+            let light = match whose {
+                Whose::Drawn => self.brought.at(i),
+                Whose::Chosen => self.chosen.light(i),
+            };
             radiance[s] += if self.rays.is_blocked(k) { SampledSpectrum::ZERO } else { light };
         }
     }
@@ -341,7 +344,7 @@ impl Batch {
     }
 
     /// Finds out whether anything is in the way of the light of the lanes that ask.
-    fn test_light(
+    fn look_for_obstacles(
         &mut self,
         asking: usize,
         whose: Whose,
@@ -376,7 +379,8 @@ impl Batch {
 }
 
 /// Light samples of a batch's paths.
-enum Whose {
+#[derive(Clone, Copy)]
+pub(super) enum Whose {
     /// Those that were drawn last.
     Drawn,
     /// Those that were chosen among several.

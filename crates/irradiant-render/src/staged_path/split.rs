@@ -2,6 +2,7 @@
 
 use super::batch::{Batch, SpectrumLanes};
 use super::kernels::Choose;
+use super::lamps::Whose;
 use crate::camera_samples::BatchSample;
 use crate::integrator::RenderStats;
 use crate::light_samples::{LightChoice, Reservoir, all_are_sampled};
@@ -77,34 +78,25 @@ impl Batch {
         radiance: &mut [SampledSpectrum],
         stats: &mut RenderStats,
     ) {
-        let LightChoice { splits, is_resampled } = choice;
         // A path's are added to each other first, since sums depend on the order.
         let mut sums = [SampledSpectrum::ZERO; LANES];
         let sums = &mut sums[..radiance.len()];
         self.seek_light(n);
-        if is_resampled {
+        if choice.is_resampled {
             let [_, _, _, numbers] = &self.light.0;
             self.chosen.begin(n, numbers);
         }
-        let mut candidates = |b: &mut Self| {
-            if !b.sample_picked(n, scene, samples) {
-            } else if is_resampled {
-                b.bring_alone();
-                scene.geometry.level().run(Choose(b, n));
-            } else {
-                b.arriving_light(n, scene, samples, sums, stats);
-            }
-        };
-        if all_are_sampled(scene, splits) {
+        if all_are_sampled(scene, choice.splits) {
             let seeking = std::mem::take(&mut self.seeking);
             for light in 0..scene.lights.len() as u32 {
                 for &i in &seeking {
                     self.pick(i as usize, PickedLight { id: LightId(light), pmf: 1.0 }, 1.0, choice);
                 }
-                candidates(self);
+                self.next_light_samples(n, choice, scene, samples, sums, stats);
             }
             self.seeking = seeking;
         } else {
+            let splits = choice.splits;
             self.pick_split(n, splits, scene);
             let most = self.light_counts[..n].iter().copied().max().unwrap_or(0);
             for k in 0..most {
@@ -115,16 +107,36 @@ impl Batch {
                         self.pick(i, picked, times as f32 / splits as f32, choice);
                     }
                 }
-                candidates(self);
+                self.next_light_samples(n, choice, scene, samples, sums, stats);
             }
         }
-        if is_resampled {
-            self.chosen_light(n, scene, samples, radiance, stats);
-            return;
+        if choice.is_resampled {
+            self.test_light(n, Whose::Chosen, scene, samples, sums, stats);
         }
         for i in 0..n {
             let s = self.sample[i] as usize;
             radiance[s] += sums[s];
+        }
+    }
+
+    /// One more light sample of each path that has picked a light: what it brings, or a candidate more to choose from.
+    fn next_light_samples(
+        &mut self,
+        n: usize,
+        choice: LightChoice,
+        scene: &Scene,
+        samples: &[BatchSample],
+        sums: &mut [SampledSpectrum],
+        stats: &mut RenderStats,
+    ) {
+        if !self.sample_picked(n, scene, samples) {
+            return;
+        }
+        if choice.is_resampled {
+            self.bring_alone();
+            scene.geometry.level().run(Choose(self, n));
+        } else {
+            self.arriving_light(n, scene, samples, sums, stats);
         }
     }
 

@@ -245,7 +245,8 @@ fn furnace_terms(c: &Context, sheet: &mut Sheet, rho: f64) -> Result<(), Error> 
     let full = c.budget() == crate::Budget::Full;
     let (spp, bound) = if full { (1 << 18, 0.001) } else { (1 << 11, 0.02) };
     let made = if c.faulty("albedo-off") { 1.01 * rho } else { rho };
-    let production = Production { max_depth: Some(12), roulette: PathRoulette::Constant(0.05) };
+    let production =
+        Production { max_depth: Some(12), roulette: PathRoulette::Constant(0.05), ..Production::default() };
     let mut terms = vec![Mean::new(); 11];
     for _ in 0..REPLICATES {
         let scene = c.scene("furnace-room", &furnace_room(made), Setup::square(1, spp))?;
