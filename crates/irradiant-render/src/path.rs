@@ -161,7 +161,7 @@ const CANDIDATES_OPTION: OptionEntry = OptionEntry {
     name: "candidates",
     range: OptionRange::Count(1, MOST_SPLITS),
     default: Value::Count(CANDIDATES),
-    doc: "lights of which one is tested by a ray at the first two surfaces, drawn in proportion to what each would bring if nothing stood in the way (A59): so many that are picked, or each light in turn if there are at most four times as many as candidates, and at most 64; 1: no choice. At the first surface `lights` goes before, if above 1",
+    doc: "light samples drawn at the first two surfaces, of which a ray tests one, chosen in proportion to what each would bring if nothing stood in the way (A59): of so many lights that are picked or, if the scene has at most four times as many lights, and at most 64, of each; 1: no choice. Not under `coats weighted as in pbrt-v4`. At the first surface `lights` goes before, if above 1",
 };
 
 /// By name.
@@ -305,7 +305,8 @@ impl PathIntegrator {
             return LightChoice { splits: self.light_splits, is_resampled: false };
         }
         let (lights, candidates) = (scene.lights.len(), self.light_candidates);
-        if depth >= CHOOSING || candidates == 1 || lights <= 1 {
+        // What coats weighted as in pbrt-v4 look like depends on the weights between light and BSDF samples, which are pbrt's with one light.
+        if depth >= CHOOSING || candidates == 1 || lights <= 1 || scene.materials.uses_pbrt_coat_weights() {
             return LightChoice::ONE;
         }
         let takes_turns = lights <= (TURNS_PER_PICK * candidates as usize).min(MOST_SPLITS as usize);

@@ -199,6 +199,19 @@ fn choosing_a_light_among_candidates_changes_nothing_but_noise() {
     }
 }
 
+#[test]
+fn coats_weighted_as_in_pbrt_look_as_with_one_light() {
+    // What they look like depends on the weights of light samples. Exact coats do not: there candidates are chosen.
+    let pixels = |coat: &str, words: &str| {
+        let floor = format!("Material \"coateddiffuse\" \"float roughness\" .3 {coat}\n")
+            + &quad([[-9.0, -0.4, -9.0], [9.0, -0.4, -9.0], [9.0, -0.4, 0.5], [-9.0, -0.4, 0.5]]);
+        estimate(&lamps_over_metal(&floor), How::new(64, 560).depth(2).by(path(words))).mean
+    };
+    assert_eq!(pixels("", "candidates=2"), pixels("", "candidates=1"));
+    let exact = "\"integer maxdepth\" 0";
+    assert_ne!(pixels(exact, "candidates=2"), pixels(exact, "candidates=1"));
+}
+
 /// `path` with these options.
 fn path(words: &str) -> IntegratorChoice {
     let choice = words.split(' ').fold(IntegratorChoice::named("path"), |c, word| c?.with_words(word));

@@ -4,10 +4,10 @@ use irradiant::drawing::{DrawingOptions, draw_paths};
 use irradiant::math::{Normal3, Point2, Point3};
 use irradiant::renderer::inspect::incident::mean_residual;
 use irradiant::renderer::inspect::light_claims::{light_density_integral, off_lights};
+use irradiant::renderer::inspect::story::LightOutcome;
 use irradiant::renderer::inspect::{
     AuditSettings, IncidentSettings, PathStory, audit, dimensions, incident, replay, residuals,
 };
-use irradiant::renderer::inspect::story::LightOutcome;
 use irradiant::renderer::path::PathIntegrator;
 use irradiant::renderer::record::PathEnd;
 use irradiant::{IntegratorChoice, Job, RenderSettings, load_text};

@@ -91,6 +91,7 @@ fn story(job: &Job, s: &PathStory, bounces: Option<&RangeInclusive<u32>>) -> Val
                 "pdf_bsdf": c.bsdf_pdf,
                 "product_of_pdfs": f.account.map(|a| a.density),
                 "density_in_weight": f.account.map(|a| a.density_in_weight),
+                "chance_among_candidates": f.account.map(|a| a.chance_among_candidates),
             })
         })
         .collect();

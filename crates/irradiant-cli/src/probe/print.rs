@@ -144,6 +144,9 @@ fn light(f: &Found) {
         c.light_pdf,
         c.bsdf_pdf
     );
+    if let Some(a) = f.account.filter(|a| a.chance_among_candidates < 1.0) {
+        println!("             chosen among candidates with the chance {:.5}", a.chance_among_candidates);
+    }
     match f.account {
         Some(a) => println!(
             "             product of pdfs {:.7e}, density in the weight {:.7e}, differ by {:.1e}",

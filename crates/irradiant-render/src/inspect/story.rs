@@ -86,6 +86,8 @@ pub struct Account {
     pub density: f64,
     /// The density that the path's weight contains: value times weight over contribution.
     pub density_in_weight: f64,
+    /// Of `density`, the chance with which a light sample was chosen among candidates; 1 where it was not.
+    pub chance_among_candidates: f64,
 }
 
 impl Account {
@@ -290,7 +292,8 @@ impl Bookkeeper<'_> {
                     let outcome = match found(Technique::LightSample, depth + 1).find(|c| c.light == asked.light) {
                         Some(c) => {
                             let chance = if choice.is_resampled { asked.expected / total } else { 1.0 };
-                            let account = Some(self.account(c, asked.arriving, asked.f_cos, asked.density * chance));
+                            let account = self.account(c, asked.arriving, asked.f_cos, asked.density * chance);
+                            let account = Some(Account { chance_among_candidates: chance, ..account });
                             story.found.push(Found { contribution: *c, from: depth + 1, to: asked.to, account });
                             LightOutcome::Lit
                         }
@@ -328,7 +331,7 @@ impl Bookkeeper<'_> {
         // By the wavelength that carries most.
         let best = (0..4).max_by(|&a, &b| c.radiance[a].total_cmp(&c.radiance[b])).unwrap_or(0);
         let density_in_weight = value[best] * f64::from(c.mis_weight) / f64::from(c.radiance[best]);
-        Account { value, density, density_in_weight }
+        Account { value, density, density_in_weight, chance_among_candidates: 1.0 }
     }
 
     /// Asks a light of the vertex again that stands for a `share` of those that were picked.
