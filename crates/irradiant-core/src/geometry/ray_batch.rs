@@ -126,7 +126,7 @@ const ENOUGH: usize = 32;
 /// at hand for the next.
 ///
 /// On Granite Rapids, by turns: the street 0.92 and 0.965 of the time beside much other work, when caches are short, 0.985 to 1.035 on a quiet machine; an interior 1.00.
-/// By octant, origin (64 cells), direction, beside other work: 0.93; by origin, direction: 1.07. Shadow rays by direction 1.12: those of neighbouring pixels no longer go
+/// By octant, origin (64 cells), direction, beside other work: 0.93; by origin, direction: 1.07. The last ones, which only ask whether anything is in the way: 1.00. Shadow rays by direction 1.12: those of neighbouring pixels no longer go
 /// in packets.
 fn by_direction<'a>(rays: &[bvh::Ray], order: &'a mut [u16; LANES]) -> &'a [u16] {
     let order = &mut order[..rays.len()];
