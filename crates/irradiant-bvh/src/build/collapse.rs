@@ -79,7 +79,8 @@ pub(crate) fn collapse(
     // Room for somewhat more than is expected: memory that is never touched costs nothing.
     let mut blocks = vec_on_large_pages((1.25 * report.triangles as f32 / plan.per_block) as usize);
     let mut first_blocks: Vec<u32> = Vec::with_capacity(layout.leaves.len());
-    // Not all at once: what the threads fill is copied while it is in the cache, and its memory used again.
+    // Not all at once: what the threads fill is copied while it is in the cache, and its memory used again. Having all threads clear what a wave is copied to first:
+    // 1.02 of the time of two threads.
     for wave in layout.leaves.chunks(WAVE) {
         let packed: Vec<Packed> =
             wave.par_chunks(WAVE / 32).map(|runs| pack::pack(runs, &refs, input, starts)).collect();
