@@ -38,7 +38,7 @@ pub struct PathIntegrator {
     /// Strata of the choice of a light at the first surface, 1 to 64: each light that is picked is tested.
     pub light_splits: u32,
     /// Light samples of which one is tested at the first two surfaces, unless `light_splits` says otherwise, 1 to 64: so many that are picked, or each
-    /// light in turn if there are no more than four times as many, nor than 64.
+    /// light in turn if there are no more than four times as many, nor than 64. One in scenes with coats weighted as in pbrt-v4.
     pub light_candidates: u32,
 }
 
